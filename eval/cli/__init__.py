@@ -1,0 +1,1 @@
+"""The `muslin` command line, one file a command."""

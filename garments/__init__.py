@@ -1,0 +1,1 @@
+"""Sewing patterns and the meshes cut from them."""

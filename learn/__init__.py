@@ -1,0 +1,1 @@
+"""Learned drapes: the only package that imports torch."""

@@ -1,0 +1,1 @@
+"""The simulated world: bodies, motion, cloth, contact, datasets."""

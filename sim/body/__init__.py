@@ -1,0 +1,1 @@
+"""Bodies of SMPL form: model, measurements, loaders."""

@@ -1,0 +1,1 @@
+"""Contact: detection, barrier, friction, continuous collision detection."""

@@ -1,0 +1,1 @@
+"""Datasets of simulated samples: schema, storage, generation, verification."""

@@ -1,0 +1,1 @@
+"""Elastic energies: each gives value, gradient and positive semi-definite Hessian blocks."""

@@ -1,0 +1,1 @@
+"""Motion clips of AMASS form."""

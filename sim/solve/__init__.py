@@ -1,0 +1,1 @@
+"""Linear solver, Newton minimisation, time stepping."""
