@@ -3,6 +3,10 @@
 from setuptools import find_packages, setup
 
 FOLDERS = ["garments", "sim", "learn", "eval"]
-PACKAGES = [f"muslin.{name}" for folder in FOLDERS for name in [folder, *(f"{folder}.{sub}" for sub in find_packages(folder))]]
+PACKAGES = [
+    f"muslin.{name}"
+    for folder in FOLDERS
+    for name in [folder, *(f"{folder}.{subfolder}" for subfolder in find_packages(folder))]
+]
 
 setup(packages=PACKAGES, package_dir={"muslin": "."})
