@@ -1,0 +1,1 @@
+"""The designs of the catalogue, one file each."""
