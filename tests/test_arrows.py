@@ -33,8 +33,8 @@ LOADS_NO = {
     "muslin.eval": {"torch"},
     "muslin.eval.metrics": {"warp"},
 }
-# Scripts that made committed data, once, with libraries that nothing else needs: free in what they import, but no
-# other module may import them.
+# Scripts that made committed data, once, with libraries that nothing else needs: free in what they import, but
+# no other module may import them.
 MADE_DATA = "muslin.sim.body.bake"
 
 
@@ -132,9 +132,7 @@ def test_importing_stays_light(package: str) -> None:
         " -> ".join(chain)
         for library in sorted(LOADS_NO[package])
         for module in MODULES
-        if inside(module, package)
-        and not inside(module, MADE_DATA)
-        and (chain := chain_to(module, library))
+        if inside(module, package) and not inside(module, MADE_DATA) and (chain := chain_to(module, library))
     ]
     assert not chains, f"importing {package} loads what it must not: {chains}"
 
