@@ -33,7 +33,7 @@ LOADS_NO = {
     "muslin.eval": {"torch"},
     "muslin.eval.metrics": {"warp"},
 }
-# Scripts that made committed data, once, with libraries that nothing else needs: free in what they import, but
+# Scripts that made committed data with libraries that nothing else needs: free in what they import, but
 # no other module may import them.
 MADE_DATA = "muslin.sim.body.bake"
 
