@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.certificate import Certificate
 

@@ -1,0 +1,145 @@
+"""What of a cloth never changes during a run: connectivity, rest geometry, masses, matrix pattern."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from muslin.garments.mesh import GarmentMesh
+from muslin.sim.material import BEND_CURVATURE_STEP, Fabric
+
+
+@dataclass(frozen=True, eq=False)
+class ClothModel:
+    """Rest geometry of one cloth of V vertices, F faces, E edges, H hinges.
+
+    `faces` (F, 3), `edges` (E, 2), `hinges` (H, 4): edge vertices, then the two opposite ones.
+    `inverse_rest` (F, 2, 2): inverse of the rest edge matrix in (warp, weft) coordinates, 1/m.
+    `rest_area` (F,) m^2; `mass` (V,) kg; `vertex_area` (V,) and `edge_area` (E,) m^2.
+    `hinge_length` (H,) m, `hinge_area` (H,) m^2 of both faces, `hinge_stiffness` (H, 5) N m at the table's
+    curvatures.
+    """
+
+    faces: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    hinges: NDArray[np.int32]
+    inverse_rest: NDArray[np.float64]
+    rest_area: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    vertex_area: NDArray[np.float64]
+    edge_area: NDArray[np.float64]
+    hinge_length: NDArray[np.float64]
+    hinge_area: NDArray[np.float64]
+    hinge_stiffness: NDArray[np.float64]
+    fabric: Fabric
+
+    @property
+    def num_vertices(self) -> int:
+        return len(self.mass)
+
+    @cached_property
+    def pattern(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Block compressed rows (offsets (V+1,), columns (nnz,)) of faces and hinges, sorted, with diagonal."""
+        pairs = [np.stack([self.faces[:, a], self.faces[:, b]], 1) for a in range(3) for b in range(3)]
+        pairs += [np.stack([self.hinges[:, a], self.hinges[:, b]], 1) for a in range(4) for b in range(4)]
+        pairs.append(np.repeat(np.arange(self.num_vertices), 2).reshape(-1, 2))
+        keys = np.unique(np.concatenate(pairs).astype(np.int64) @ np.array([self.num_vertices, 1]))
+        rows, columns = keys // self.num_vertices, keys % self.num_vertices
+        offsets = np.searchsorted(rows, np.arange(self.num_vertices + 1))
+        return offsets.astype(np.int32), columns.astype(np.int32)
+
+    def slots(self, stencils: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Positions in the pattern of all vertex pairs of (N, k) stencils, (N, k * k), row-major."""
+        offsets, columns = self.pattern
+        n = self.num_vertices
+        keys = np.repeat(np.arange(n), np.diff(offsets)).astype(np.int64) * n + columns
+        k = stencils.shape[1]
+        wanted = stencils[:, :, None].astype(np.int64) * n + stencils[:, None, :]
+        return np.searchsorted(keys, wanted.reshape(len(stencils), k * k)).astype(np.int32)
+
+
+def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
+    """Rest geometry of `mesh` in `fabric`; the warp runs along panel-space +y."""
+    material = mesh.panel_vertices[:, ::-1]
+    corners = material[mesh.panel_faces]
+    rest = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    area = 0.5 * np.abs(np.linalg.det(rest))
+    faces = mesh.faces.astype(np.int32)
+    n = int(faces.max()) + 1
+    vertex_area = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=n)
+
+    edges, _, edge_of_corner = _edges(faces)
+    edge_area = np.bincount(edge_of_corner, np.tile(area / 3.0, 3), minlength=len(edges))
+    hinges, hinge_faces, hinge_corner = _hinges(faces, edges, edge_of_corner)
+    stiffness = np.zeros((len(hinges), 5))
+    length = np.zeros(len(hinges))
+    for side in range(2):
+        # A hinge on a seam has a direction in each of its panels; both count half.
+        face, corner = hinge_faces[:, side], hinge_corner[:, side]
+        a = corners[face, (corner + 1) % 3]
+        b = corners[face, (corner + 2) % 3]
+        direction = b - a
+        length += 0.5 * np.linalg.norm(direction, axis=1)
+        angle = np.degrees(np.arctan2(np.abs(direction[:, 1]), np.abs(direction[:, 0])))
+        stiffness += 0.5 * _interpolate_rows(fabric.bend, angle / 45.0)
+    return ClothModel(
+        faces=faces,
+        edges=edges,
+        hinges=hinges,
+        inverse_rest=np.linalg.inv(rest),
+        rest_area=area,
+        mass=fabric.density * vertex_area,
+        vertex_area=vertex_area,
+        edge_area=edge_area,
+        hinge_length=length,
+        hinge_area=area[hinge_faces].sum(axis=1),
+        hinge_stiffness=stiffness,
+        fabric=fabric,
+    )
+
+
+def bend_moments(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integrals J_i of k(a) a from 0 to the i-th curvature of the table, for (H, 5) coefficients: (H, 5)."""
+    h = BEND_CURVATURE_STEP
+    k0, k1 = stiffness[:, :-1], stiffness[:, 1:]
+    a0 = h * np.arange(4)
+    slope = (k1 - k0) / h
+    # k(a) a over one interval, with a = a0 + s: (k0 + slope s)(a0 + s)
+    piece = k0 * (a0 * h + h**2 / 2.0) + slope * (a0 * h**2 / 2.0 + h**3 / 3.0)
+    return np.concatenate([np.zeros((len(stiffness), 1)), np.cumsum(piece, axis=1)], axis=1)
+
+
+def _interpolate_rows(table: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
+    lower = np.clip(position.astype(int), 0, len(table) - 2)
+    weight = (position - lower)[:, None]
+    return (1.0 - weight) * table[lower] + weight * table[lower + 1]
+
+
+def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int64]]:
+    """Unique edges, and for the edge opposite each face corner (column-major over corners) its index."""
+    directed, edges, edge_of_corner, _ = igl.unique_edge_map(faces.astype(np.int64))[:4]
+    return edges.astype(np.int32), directed.astype(np.int32), edge_of_corner.astype(np.int64)
+
+
+def _hinges(
+    faces: NDArray[np.int32], edges: NDArray[np.int32], edge_of_corner: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
+    """Interior edges as (x0, x1, x2, x3), the faces (H, 2) of x2 and x3, and the corner (H, 2) they sit at."""
+    num_faces = len(faces)
+    order = np.argsort(edge_of_corner, kind="stable")
+    counts = np.bincount(edge_of_corner, minlength=len(edges))
+    starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    interior = np.flatnonzero(counts == 2)
+    first, second = order[starts[interior]], order[starts[interior] + 1]
+    hinge_faces = np.stack([first % num_faces, second % num_faces], axis=1)
+    hinge_corner = np.stack([first // num_faces, second // num_faces], axis=1)
+    # Orientation: the edge as the first face runs through it.
+    x0 = faces[hinge_faces[:, 0], (hinge_corner[:, 0] + 1) % 3]
+    x1 = faces[hinge_faces[:, 0], (hinge_corner[:, 0] + 2) % 3]
+    x2 = faces[hinge_faces[:, 0], hinge_corner[:, 0]]
+    x3 = faces[hinge_faces[:, 1], hinge_corner[:, 1]]
+    return np.stack([x0, x1, x2, x3], axis=1).astype(np.int32), hinge_faces, hinge_corner

@@ -1,0 +1,103 @@
+"""Lagged Coulomb friction as a smooth dissipative potential, as Warp kernels.
+
+A contact of the start of the step, with weights w, normal n and normal force lam, slips by
+u = (I - n n^T) sum_i w_i (X_i - X_i^start), body motion included. Its potential is mu lam f0(|u|) with
+f0(y) = y outside eps and a cubic inside, so that the force mu lam f1(|u|) u / |u| is smooth:
+
+    f1(y) = 2 y / eps - (y / eps)^2 for y < eps, else 1;    f0' = f1.
+
+Source: Li et al. 2020, "Incremental potential contact", section 5.
+"""
+
+import warp as wp
+
+from muslin.sim.solve.block_matrix import BlockMatrix, add_block
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class FrictionModel:
+    """Contacts of the start of the step; `slip` is eps in metres a step."""
+
+    pairs: wp.array(dtype=wp.vec4i)
+    weights: wp.array(dtype=wp.vec4d)
+    normal: wp.array(dtype=wp.vec3d)
+    force: wp.array(dtype=wp.float64)
+    num_cloth: int
+    cloth_body: wp.float64
+    cloth_cloth: wp.float64
+    slip: wp.float64
+
+
+@wp.func
+def friction_coefficient(model: FrictionModel, pair: wp.vec4i) -> wp.float64:
+    for i in range(4):
+        if pair[i] >= model.num_cloth:
+            return model.cloth_body
+    return model.cloth_cloth
+
+
+@wp.func
+def slip_vector(
+    model: FrictionModel, k: int, x: wp.array(dtype=wp.vec3d), start: wp.array(dtype=wp.vec3d)
+) -> wp.vec3d:
+    pair = model.pairs[k]
+    w = model.weights[k]
+    n = model.normal[k]
+    u = wp.vec3d()
+    for i in range(4):
+        u += (x[pair[i]] - start[pair[i]]) * w[i]
+    return u - n * wp.dot(n, u)
+
+
+@wp.kernel
+def friction_value(
+    x: wp.array(dtype=wp.vec3d),
+    start: wp.array(dtype=wp.vec3d),
+    model: FrictionModel,
+    energy: wp.array(dtype=wp.float64),
+):
+    """energy[0] += sum of mu lam f0(|u|)."""
+    k = wp.tid()
+    y = wp.length(slip_vector(model, k, x, start))
+    e = model.slip
+    f0 = y
+    if y < e:
+        f0 = -y * y * y / (wp.float64(3.0) * e * e) + y * y / e + e / wp.float64(3.0)
+    wp.atomic_add(energy, 0, friction_coefficient(model, model.pairs[k]) * model.force[k] * f0)
+
+
+@wp.kernel
+def friction_derivatives(
+    x: wp.array(dtype=wp.vec3d),
+    start: wp.array(dtype=wp.vec3d),
+    remaining: wp.array(dtype=wp.vec3d),
+    model: FrictionModel,
+    gradient: wp.array(dtype=wp.vec3d),
+    matrix: BlockMatrix,
+):
+    """Adds gradient and the positive semi-definite Hessian mu lam (f1(|u|) / |u|) (I - n n^T)."""
+    k = wp.tid()
+    pair = model.pairs[k]
+    w = model.weights[k]
+    n = model.normal[k]
+    u = slip_vector(model, k, x, start)
+    y = wp.length(u)
+    e = model.slip
+    ratio = wp.float64(2.0) / e - y / (e * e)
+    if y >= e:
+        ratio = wp.float64(1.0) / y
+    c = friction_coefficient(model, pair) * model.force[k] * ratio
+    carried = wp.vec3d()
+    for i in range(int(0), int(4)):
+        if pair[i] >= model.num_cloth:
+            carried += remaining[pair[i]] * w[i]
+    along = (u + carried - n * wp.dot(n, carried)) * c
+    block = (wp.identity(n=3, dtype=wp.float64) - wp.outer(n, n)) * c
+    for i in range(int(0), int(4)):
+        if pair[i] < model.num_cloth:
+            wp.atomic_add(gradient, pair[i], along * w[i])
+            for j in range(int(0), int(4)):
+                if pair[j] < model.num_cloth:
+                    add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))

@@ -1,0 +1,260 @@
+"""Contact of one cloth with itself and with one moving collider: candidates, barrier, friction, safe steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from muslin.sim.cloth import ClothModel
+from muslin.sim.contact.barrier import PairMeasure, active_pairs, barrier_derivatives, barrier_value
+from muslin.sim.contact.broad_phase import (
+    edge_edge_candidates,
+    element_bounds,
+    sweep_vertices,
+    vertex_face_candidates,
+)
+from muslin.sim.contact.ccd import largest_safe_step
+from muslin.sim.contact.friction import FrictionModel, friction_derivatives, friction_value
+from muslin.sim.solve.block_matrix import BlockMatrix
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """`range` m: distance below which the barrier acts; `stiffness` J/m^2; friction coefficients; `slip_speed`
+    m/s below which friction sticks smoothly."""
+
+    range: float = 2.0e-3
+    stiffness: float = 1.0
+    friction_body: float = 0.3
+    friction_cloth: float = 0.3
+    slip_speed: float = 5.0e-3
+
+
+class _Elements:
+    """Faces or edges of one side with their bounding volume hierarchy."""
+
+    def __init__(self, indices: NDArray[np.int32], device: str) -> None:
+        self.device = device
+        self.count = len(indices)
+        self.indices = wp.array(indices, dtype=wp.int32, device=device, ndim=2)
+        self.on = wp.array(np.ones(self.count, np.int32), device=device)
+        self.low = wp.zeros(self.count, dtype=wp.vec3, device=device)
+        self.high = wp.zeros(self.count, dtype=wp.vec3, device=device)
+        self.bvh: wp.Bvh | None = None
+
+    def update(self, vertex_low: wp.array, vertex_high: wp.array, rebuild: bool) -> None:
+        if self.count == 0:
+            return
+        wp.launch(
+            element_bounds, self.count, [self.indices, vertex_low, vertex_high, self.low, self.high], device=self.device
+        )
+        if self.bvh is None or rebuild:
+            self.bvh = wp.Bvh(self.low, self.high)
+        else:
+            self.bvh.refit()
+
+
+class _PairList:
+    """Growing list of vertex quadruples; the length is known on the host after a search."""
+
+    def __init__(self, is_edge_edge: bool, capacity: int, device: str) -> None:
+        self.is_edge_edge = is_edge_edge
+        self.device = device
+        self.count = wp.zeros(1, dtype=wp.int32, device=device)
+        self.pairs = wp.zeros(capacity, dtype=wp.vec4i, device=device)
+        self.length = 0
+
+
+class ContactSystem:
+    """Joint vertex array: V cloth vertices, then N collider vertices.
+
+    `collider_faces` (M, 3) index the collider's own vertices. Primitives of the collider that lie within it can
+    be switched off by `mask`.
+    """
+
+    def __init__(
+        self,
+        cloth: ClothModel,
+        collider_faces: NDArray[np.int32],
+        collider_rest: NDArray[np.float64],
+        settings: ContactSettings,
+        device: str,
+    ) -> None:
+        self.settings = settings
+        self.device = device
+        self.num_cloth = cloth.num_vertices
+        self.num_collider = len(collider_rest)
+        n = self.num_cloth + self.num_collider
+        self.collider_faces = collider_faces
+        body_faces = collider_faces.astype(np.int32) + self.num_cloth
+        body_edges = (
+            igl.edges(collider_faces.astype(np.int64)).astype(np.int32) + self.num_cloth
+            if len(collider_faces)
+            else np.zeros((0, 2), np.int32)
+        )
+        self._body_edge_array = body_edges
+        self.cloth_faces = _Elements(cloth.faces, device)
+        self.cloth_edges = _Elements(cloth.edges, device)
+        self.body_faces = _Elements(body_faces, device)
+        self.body_edges = _Elements(body_edges, device)
+        self.cloth_vertices = wp.array(np.arange(self.num_cloth, dtype=np.int32), device=device)
+        self.body_vertices = wp.array(np.arange(self.num_cloth, n, dtype=np.int32), device=device)
+        self.vertex_on = wp.array(np.ones(n, np.int32), device=device)
+        self.vertex_low = wp.zeros(n, dtype=wp.vec3d, device=device)
+        self.vertex_high = wp.zeros(n, dtype=wp.vec3d, device=device)
+
+        area = np.concatenate([cloth.vertex_area, _vertex_areas(collider_rest, collider_faces)])
+        self.measure = PairMeasure()
+        self.measure.vertex_area = wp.array(area, dtype=wp.float64, device=device)
+        self.measure.num_cloth = self.num_cloth
+        self.measure.range_ = settings.range
+        self.measure.stiffness = settings.stiffness
+
+        self.lists = [_PairList(False, 8 * self.num_cloth, device), _PairList(True, 16 * self.num_cloth, device)]
+        self.active = wp.zeros(1, dtype=wp.int32, device=device)
+        self.nearest = wp.zeros(1, dtype=wp.float64, device=device)
+        self._searches = 0
+        self.friction = FrictionModel()
+        self.num_friction = 0
+        self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
+        self._reserve_friction(8 * self.num_cloth)
+
+    def mask(self, face_on: NDArray[np.bool_]) -> None:
+        """Switch collider faces on or off; edges and vertices follow the faces around them."""
+        self.body_faces.on.assign(face_on.astype(np.int32))
+        live = np.zeros(self.num_collider, bool)
+        live[self.collider_faces[face_on].ravel()] = True
+        on = np.ones(self.num_cloth + self.num_collider, np.int32)
+        on[self.num_cloth :] = live
+        self.vertex_on.assign(on)
+        edges = self._body_edge_array - self.num_cloth
+        keys = igl.edges(self.collider_faces[face_on].astype(np.int64)) if face_on.any() else np.zeros((0, 2), int)
+        n = self.num_collider
+        alive = np.isin(
+            edges.min(1).astype(np.int64) * n + edges.max(1), keys.min(1).astype(np.int64) * n + keys.max(1)
+        )
+        self.body_edges.on.assign(alive.astype(np.int32))
+
+    def search(self, x: wp.array, p: wp.array) -> None:
+        """List every pair that may come within range on the way from x to x + p."""
+        n = self.num_cloth + self.num_collider
+        wp.launch(sweep_vertices, n, [x, p, self.vertex_low, self.vertex_high], device=self.device)
+        rebuild = self._searches % 50 == 0
+        self._searches += 1
+        for elements in (self.cloth_faces, self.cloth_edges, self.body_faces, self.body_edges):
+            elements.update(self.vertex_low, self.vertex_high, rebuild)
+        low = self.vertex_low.numpy()[: self.num_cloth].min(axis=0) - self.settings.range
+        high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + self.settings.range
+        for pairs in self.lists:
+            for _ in range(2):
+                self._launch_search(pairs, wp.vec3d(*low), wp.vec3d(*high))
+                found = int(pairs.count.numpy()[0])
+                pairs.length = found
+                if found <= len(pairs.pairs):
+                    break
+                pairs.pairs = wp.zeros(found + found // 2, dtype=wp.vec4i, device=self.device)
+
+    def _launch_search(self, out: _PairList, low: wp.vec3d, high: wp.vec3d) -> None:
+        out.count.zero_()
+        radius = self.settings.range
+        bounds = [self.vertex_low, self.vertex_high]
+        has_body = self.body_faces.bvh is not None
+        if out.is_edge_edge:
+            queries = self.cloth_edges
+            for target in (self.cloth_edges, self.body_edges) if has_body else (self.cloth_edges,):
+                assert target.bvh is not None
+                wp.launch(
+                    edge_edge_candidates,
+                    queries.count,
+                    [target.bvh.id, queries.indices, target.indices, target.on, int(target is queries), *bounds]
+                    + [radius, out.count, out.pairs],
+                    device=self.device,
+                )
+            return
+        searches = [(self.cloth_vertices, self.cloth_faces)]
+        if has_body:
+            searches += [(self.cloth_vertices, self.body_faces), (self.body_vertices, self.cloth_faces)]
+        for vertices, target in searches:
+            assert target.bvh is not None
+            wp.launch(
+                vertex_face_candidates,
+                len(vertices),
+                [target.bvh.id, vertices, target.indices, self.vertex_on, target.on, *bounds, low, high]
+                + [radius, out.count, out.pairs],
+                device=self.device,
+            )
+
+    def largest_step(self, x: wp.array, p: wp.array, step: wp.array) -> float:
+        """Largest t in (0, 1] for which x + t p keeps every listed pair apart. `step` is a scratch array (1,)."""
+        step.fill_(1.0)
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, p, pairs.pairs, pairs.is_edge_edge, step]
+                wp.launch(largest_safe_step, pairs.length, args, device=self.device)
+        return float(step.numpy()[0])
+
+    def add_value(self, x: wp.array, start: wp.array, energy: wp.array) -> None:
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, start, pairs.pairs, pairs.is_edge_edge, self.measure, energy]
+                wp.launch(barrier_value, pairs.length, args, device=self.device)
+        if self.num_friction:
+            wp.launch(friction_value, self.num_friction, [x, start, self.friction, energy], device=self.device)
+
+    def add_derivatives(
+        self, x: wp.array, start: wp.array, remaining: wp.array, gradient: wp.array, matrix: BlockMatrix
+    ) -> None:
+        self.active.zero_()
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, start, remaining, pairs.pairs, pairs.is_edge_edge, self.measure, gradient, matrix, self.active]
+                wp.launch(barrier_derivatives, pairs.length, args, device=self.device)
+        if self.num_friction:
+            args = [x, start, remaining, self.friction, gradient, matrix]
+            wp.launch(friction_derivatives, self.num_friction, args, device=self.device)
+
+    def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
+        """Freeze the contacts at x, which must be within reach of the last search, for this step's friction."""
+        self._list_active(x)
+        if self.num_friction > len(self.friction.force):
+            self._reserve_friction(2 * self.num_friction)
+            self._list_active(x)
+        if not friction:
+            self.num_friction = 0
+        self.friction.num_cloth = self.num_cloth
+        self.friction.cloth_body = self.settings.friction_body
+        self.friction.cloth_cloth = self.settings.friction_cloth
+        self.friction.slip = self.settings.slip_speed * dt
+
+    def smallest_distance(self, x: wp.array) -> float:
+        """Smallest distance among the listed pairs, m; infinity where none is listed."""
+        self._list_active(x)
+        return float(self.nearest.numpy()[0])
+
+    def _list_active(self, x: wp.array) -> None:
+        self._friction_count.zero_()
+        self.nearest.fill_(float("inf"))
+        f = self.friction
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, x, pairs.pairs, pairs.is_edge_edge, self.measure, self._friction_count]
+                args += [f.pairs, f.weights, f.normal, f.force, self.nearest]
+                wp.launch(active_pairs, pairs.length, args, device=self.device)
+        self.num_friction = int(self._friction_count.numpy()[0])
+
+    def _reserve_friction(self, capacity: int) -> None:
+        self.friction.pairs = wp.zeros(capacity, dtype=wp.vec4i, device=self.device)
+        self.friction.weights = wp.zeros(capacity, dtype=wp.vec4d, device=self.device)
+        self.friction.normal = wp.zeros(capacity, dtype=wp.vec3d, device=self.device)
+        self.friction.force = wp.zeros(capacity, dtype=wp.float64, device=self.device)
+
+
+def _vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    if len(faces) == 0:
+        return np.zeros(len(vertices))
+    area = 0.5 * igl.doublearea(vertices.astype(np.float64), faces.astype(np.int64))
+    return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))

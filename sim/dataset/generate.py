@@ -1,0 +1,324 @@
+"""Make the samples of a dataset over local processes; stop at any moment, run again, and it goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import multiprocessing
+import os
+import queue
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from multiprocessing.connection import wait as wait_for
+from pathlib import Path
+from typing import Any, Protocol
+
+from muslin.garments.errors import InputError
+from muslin.sim.dataset import durable, store
+from muslin.sim.dataset.config import DatasetConfig
+from muslin.sim.dataset.header import Header, canonical, digest, prepare_root
+from muslin.sim.dataset.index import write_index
+from muslin.sim.dataset.plan import Chain, Job, Plan, plan
+from muslin.sim.dataset.sample import Sample
+from muslin.sim.dataset.schema import LOCK
+
+FrameProgress = Callable[[int, int], None]
+"""(work done, work in all) of one chain."""
+
+ChainSimulator = Callable[[list[Any], str, FrameProgress | None], Iterator[Sample]]
+"""(scenes of a chain, device, progress) -> the samples in order. Must be importable by name in another process."""
+
+
+class Progress(Protocol):
+    """What `generate` tells while it runs."""
+
+    def __call__(self, done: float, total: int, message: str) -> None:
+        """done: samples made, with the begun ones in parts; total: samples to make."""
+
+
+@dataclass(frozen=True)
+class GenerateReport:
+    """made, kept (there already): ids in plan order; failed: {id: reason}."""
+
+    made: tuple[str, ...]
+    kept: tuple[str, ...]
+    failed: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What one process needs to make the missing samples of a chain."""
+
+    place: int
+    root: Path
+    chain: Chain
+    scenes: list[Any]
+    missing: frozenset[str]
+    versions: dict[str, str]
+    device: str
+    simulate: ChainSimulator | None
+
+
+def generate(
+    config: DatasetConfig,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    device: str = "cpu",
+    progress: Progress | None = None,
+    simulate: ChainSimulator | None = None,
+    make_scene: Callable[[dict[str, Any]], Any] | None = None,
+) -> GenerateReport:
+    """Make every planned sample that is not there yet.
+
+    The same configuration gives the same ids and, on one machine, the same bytes of geometry, whatever the number of
+    workers and however often the run was killed: a sample is committed whole or not at all, and a chain of drapes of
+    which any is missing is made again from its start.
+
+    workers      processes; by default one a usable core on the CPU, one on a GPU
+    simulate     `muslin.sim.run.simulate_chain` unless given
+    make_scene   what turns the values of a scene file into a scene; `Scene.model_validate` unless given
+
+    A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a scene
+    that cannot be, for a folder that may not be written to (see `prepare_root`), and when a process dies.
+    """
+    root = Path(out)
+    started = time.perf_counter()
+    if workers is not None and workers < 1:
+        raise InputError(f"workers = {workers}: must be 1 or more")
+    planned = plan(config)
+    scenes = _scenes(planned, make_scene or _default_make_scene())
+    solver = solver_digest(simulate)
+    header = Header(config=config.model_dump(mode="json"), splits=planned.splits, solver_digest=solver)
+    before = prepare_root(root, header)
+    with durable.exclusive(root / LOCK):
+        there = set(store.stored_ids(root))
+        missing = frozenset(job.id for job in planned.jobs if job.id not in there)
+        _check_solver(root, before, header, bool(missing), bool(there))
+        if before is not None and not missing:
+            header = replace(header, solver_digest=before.solver_digest, versions=before.versions)
+        header.write(root)
+        store.clean_partial(root)
+        todo = [
+            _Task(k, root, chain, chain_scenes, missing, header.versions, device, simulate)
+            for k, (chain, chain_scenes) in enumerate(zip(planned.chains, scenes, strict=True))
+            if any(job.id in missing for job in chain.jobs)
+        ]
+        failed = _run(todo, workers, device, progress or _silent) if todo else {}
+        store.clean_partial(root)
+        write_index(root, header)
+    made = tuple(job.id for job in planned.jobs if job.id in missing and job.id not in failed)
+    kept = tuple(job.id for job in planned.jobs if job.id in there)
+    return GenerateReport(made, kept, failed, time.perf_counter() - started)
+
+
+def solver_digest(simulate: ChainSimulator | None = None) -> str:
+    """sha256 over the sources and data that decide the geometry: `muslin.garments` and `muslin.sim` (without
+    `dataset`, `view` and the tools that bake assets), or the module of another simulator; with the versions installed.
+    """
+    total = hashlib.sha256(canonical(Header(config={}, splits={}).versions))
+    if simulate is not None:
+        total.update(f"{simulate.__module__}.{simulate.__qualname__}".encode())
+        return total.hexdigest()
+    for package in ("muslin.garments", "muslin.sim"):
+        folder = Path(importlib.import_module(package).__path__[0])
+        for file in sorted(p for p in folder.rglob("*") if p.suffix in _SOURCES):
+            inner = file.relative_to(folder)
+            if not _ASIDE.isdisjoint(inner.parts):
+                continue
+            total.update(inner.as_posix().encode())
+            total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()
+
+
+_SOURCES = {".py", ".toml", ".npz", ".json"}
+_ASIDE = {"dataset", "view", "bake", "retarget", "__pycache__"}
+
+
+def _check_solver(root: Path, before: Header | None, header: Header, missing: bool, there: bool) -> None:
+    if before is None or not missing or not there or before.solver_digest == header.solver_digest:
+        return
+    changed = [
+        f"{key} {before.versions.get(key, 'absent')} -> {value}"
+        for key, value in header.versions.items()
+        if before.versions.get(key) != value
+    ]
+    raise InputError(
+        f"{root}: its samples were made by another version of the solver ({', '.join(changed) or 'its code changed'}); "
+        "one dataset holds the samples of one solver: write to another folder"
+    )
+
+
+def _scenes(planned: Plan, make_scene: Callable[[dict[str, Any]], Any]) -> list[list[Any]]:
+    scenes = []
+    for chain in planned.chains:
+        made = []
+        for job in chain.jobs:
+            try:
+                made.append(make_scene(job.scene))
+            except ValueError as error:  # pydantic's ValidationError is one
+                lines = "; ".join(line.strip() for line in str(error).splitlines() if line.strip())
+                raise InputError(f"scene of sample {job.id}: {lines}") from error
+        scenes.append(made)
+    return scenes
+
+
+def _default_make_scene() -> Callable[[dict[str, Any]], Any]:
+    from muslin.sim.scene import Scene
+
+    return Scene.model_validate
+
+
+def _silent(done: float, total: int, message: str) -> None:
+    pass
+
+
+def _run(todo: Sequence[_Task], workers: int | None, device: str, progress: Progress) -> dict[str, str]:
+    """Run the chains over processes; return {id: reason} of the samples that could not be made."""
+    usable = len(os.sched_getaffinity(0)) if device == "cpu" else 1
+    count = min(workers or usable, len(todo))
+    if any(task.simulate is None for task in todo):
+        progress(0.0, 0, "compiling kernels")
+        from muslin.sim.run import compile_kernels
+
+        compile_kernels(device)
+    context = multiprocessing.get_context("spawn")
+    news: Any = context.Queue()
+    leash, held = context.Pipe(duplex=False)
+    weight = {task.place: len(task.missing.intersection(job.id for job in task.chain.jobs)) for task in todo}
+    parts = dict.fromkeys(weight, 0.0)
+    failed: dict[str, str] = {}
+    with _one_thread_each():
+        pool = ProcessPoolExecutor(
+            count, mp_context=context, initializer=_start_worker, initargs=(news, leash)
+        )
+        try:
+            # Sequences first: a long one begun last would leave the other cores idle.
+            order = sorted(todo, key=lambda task: task.chain.jobs[0].kind != "sequence")
+            pending: set[Future[dict[str, str]]] = {pool.submit(_make_chain, task) for task in order}
+            while pending:
+                finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    failed |= future.result()
+                message = _drain(news, parts)
+                progress(sum(parts[k] * weight[k] for k in weight), sum(weight.values()), message)
+        except BrokenProcessPool as error:
+            raise InputError(
+                "a worker process died, most often because memory ran out; finished samples are kept: "
+                f"run again with fewer --workers than {count}"
+            ) from error
+        except BaseException:
+            held.close()  # ends the workers, whatever they are at
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+            held.close()
+            leash.close()
+            news.close()
+    progress(float(sum(weight.values()) - len(failed)), sum(weight.values()), "")
+    return failed
+
+
+def _drain(news: Any, parts: dict[int, float]) -> str:
+    message = ""
+    while True:
+        try:
+            place, part, message = news.get_nowait()
+        except queue.Empty:
+            return message
+        parts[place] = part
+
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """One thread a process: faster with a process a core, and sums no longer depend on the number of threads."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+_news: Any = None
+
+
+def _start_worker(news: Any, leash: Connection) -> None:
+    global _news
+    _news = news
+    # What the queue still holds must not keep a worker from ending when nobody reads it any more.
+    news.cancel_join_thread()
+    threading.Thread(target=_end_with_parent, args=(leash,), daemon=True).start()
+
+
+def _end_with_parent(leash: Connection) -> None:
+    """End this process as soon as the other end of the leash is closed: by the parent, or by its death."""
+    wait_for([leash])
+    os._exit(1)
+
+
+def _make_chain(task: _Task) -> dict[str, str]:
+    """Make the missing samples of a chain; return {id: reason} of those that could not be made."""
+    simulate = task.simulate
+    if simulate is None:
+        from muslin.sim.run import simulate_chain
+
+        simulate = simulate_chain
+
+    def tell(done: int, total: int) -> None:
+        _news.put((task.place, done / max(1, total), task.chain.jobs[0].id))
+
+    left = [job for job in task.chain.jobs if job.id in task.missing]
+    started = time.perf_counter()
+    try:
+        samples = simulate(task.scenes, task.device, tell)
+        for job, sample in zip(task.chain.jobs, samples, strict=True):
+            seconds = time.perf_counter() - started
+            if job.id in task.missing:
+                store.write_sample(task.root, _named(job, sample, task, seconds))
+                left.remove(job)
+            if not left:
+                break
+            started = time.perf_counter()
+    except Exception as error:  # reported for the samples it cost; the other chains are not its business
+        reason = f"{type(error).__name__}: {error}"
+        if not isinstance(error, InputError) and type(error).__name__ != "SimulationError":
+            reason += "\n" + traceback.format_exc()
+        return {job.id: reason for job in left}
+    _news.put((task.place, 1.0, task.chain.jobs[0].id))
+    return {}
+
+
+def _named(job: Job, sample: Sample, task: _Task, seconds: float) -> Sample:
+    certificate = replace(
+        sample.certificate,
+        seed=job.seed,
+        config_hash=digest(job.scene),
+        seconds=sample.certificate.seconds or seconds,
+        versions=task.versions | sample.certificate.versions,
+    )
+    return replace(
+        sample,
+        id=job.id,
+        kind=job.kind,  # type: ignore[arg-type]
+        seed=job.seed,
+        scene=job.scene,
+        labels=sample.labels | job.labels,
+        fabric=sample.fabric or job.labels.get("fabric", ""),
+        certificate=certificate,
+    )

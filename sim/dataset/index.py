@@ -1,0 +1,126 @@
+"""`index.parquet`: one row a sample, so that tables and splits need not open every group."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from muslin.garments.errors import InputError
+from muslin.sim.dataset import durable, store
+from muslin.sim.dataset.header import Header
+from muslin.sim.dataset.schema import INDEX
+
+COLUMNS = pa.schema(
+    [
+        ("id", pa.string()),
+        ("kind", pa.string()),
+        ("split", pa.string()),
+        ("garment", pa.string()),
+        ("design", pa.string()),
+        ("shape", pa.string()),
+        ("sequence", pa.string()),
+        ("fabric", pa.string()),
+        ("body", pa.string()),
+        ("frames", pa.int64()),
+        ("fps", pa.float64()),
+        ("vertices", pa.int64()),
+        ("seed", pa.int64()),
+        ("cloth_cloth_intersections", pa.int64()),
+        ("cloth_body_intersections", pa.int64()),
+        ("masked_body_faces_max", pa.int64()),
+        ("min_distance_m", pa.float64()),
+        ("force_residual", pa.float64()),
+        ("largest_strain", pa.float64()),
+        ("seconds", pa.float64()),
+        ("bytes", pa.int64()),
+        ("geometry_sha256", pa.string()),
+    ]
+)
+
+_FROM_CERTIFICATE = (
+    "cloth_cloth_intersections",
+    "cloth_body_intersections",
+    "masked_body_faces_max",
+    "min_distance_m",
+    "force_residual",
+    "largest_strain",
+    "seconds",
+)
+
+
+def row(root: Path, header: Header, sample_id: str) -> dict[str, Any]:
+    """The row of a sample, read from its group. Raises InputError if the group is damaged."""
+    meta, checksums = store.read_meta(root, sample_id)
+    labels, certificate = meta["labels"], meta["certificate"]
+    values = {
+        "id": sample_id,
+        "kind": meta["kind"],
+        "split": header.splits.get(sample_id, ""),
+        "garment": meta["garment"]["name"],
+        "design": labels.get("design", meta["garment"]["name"]),
+        "shape": labels.get("shape", ""),
+        "sequence": labels.get("sequence", ""),
+        "fabric": meta["fabric"],
+        "body": (meta["body"] or {}).get("model", ""),
+        "frames": meta["frames"],
+        "fps": meta["fps"],
+        "vertices": meta["vertices"],
+        "seed": meta["seed"],
+        "bytes": store.stored_bytes(root, sample_id),
+        "geometry_sha256": store.geometry_digest(checksums),
+    }
+    return values | {key: certificate[key] for key in _FROM_CERTIFICATE}
+
+
+def write_index(root: Path, header: Header) -> None:
+    """Write the rows of all samples that are there, in plan order, replacing the index in one step."""
+    ids = in_plan_order(header, store.stored_ids(root))
+    table = pa.Table.from_pylist([row(root, header, sample_id) for sample_id in ids], schema=COLUMNS)
+    sink = io.BytesIO()
+    pq.write_table(table, sink)
+    durable.write_file(root / INDEX, sink.getvalue())
+
+
+def read_index(root: Path, header: Header) -> list[dict[str, Any]]:
+    """Rows of all samples, in plan order.
+
+    Rows that the index lacks (a run was killed before it wrote them) are read from the samples; a row whose sample is
+    gone is kept, so that the loss is seen. Raises InputError if the index or a sample is damaged.
+    """
+    rows = {entry["id"]: entry for entry in _stored_rows(root)}
+    ids = in_plan_order(header, {*rows, *store.stored_ids(root)})
+    found = [rows[sample_id] if sample_id in rows else row(root, header, sample_id) for sample_id in ids]
+    return [entry | {"split": header.splits.get(entry["id"], "")} for entry in found]
+
+
+def listed_ids(root: Path) -> list[str]:
+    """Ids in the index file; empty without one. Raises InputError if it is damaged."""
+    return [entry["id"] for entry in _stored_rows(root)]
+
+
+def _stored_rows(root: Path) -> list[dict[str, Any]]:
+    path = root / INDEX
+    if not path.is_file():
+        return []
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{path}: not readable ({error}); {_REBUILD}") from error
+    if table.schema.names != COLUMNS.names:
+        raise InputError(f"{path}: columns are not those of an index; {_REBUILD}")
+    return table.to_pylist()
+
+
+_REBUILD = "delete it, it is rebuilt from the samples"
+
+
+def in_plan_order(header: Header, ids: Iterable[str]) -> list[str]:
+    """Planned ids in the order of the plan, then any others sorted."""
+    present = set(ids)
+    planned = [sample_id for sample_id in header.splits if sample_id in present]
+    return planned + sorted(present - header.splits.keys())

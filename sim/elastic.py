@@ -1,0 +1,76 @@
+"""Elastic energies of one cloth on a device: value, gradient and Hessian of stretch and bending together."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from muslin.sim.cloth import ClothModel, bend_moments
+from muslin.sim.energies.bending import BendModel, bend_angle, bend_derivatives, bend_value
+from muslin.sim.energies.stretch import StretchModel, strainv, stretch_derivatives, stretch_strain, stretch_value
+from muslin.sim.solve.block_matrix import BlockMatrix
+
+
+class ElasticEnergy:
+    """Stretch and bending of a `ClothModel`; `damping` in seconds scales stiffness into viscosity."""
+
+    def __init__(self, cloth: ClothModel, device: str, damping: float = 0.0) -> None:
+        self.device = device
+        self.damping = damping
+        self.num_faces = len(cloth.faces)
+        self.num_hinges = len(cloth.hinges)
+        f64 = {"dtype": wp.float64, "device": device}
+
+        stretch = StretchModel()
+        stretch.faces = wp.array(cloth.faces, dtype=wp.vec3i, device=device)
+        stretch.inverse_rest = wp.array(cloth.inverse_rest, dtype=wp.mat22d, device=device)
+        stretch.rest_area = wp.array(cloth.rest_area, **f64)
+        stretch.fabric = wp.zeros(self.num_faces, dtype=wp.int32, device=device)
+        stretch.rest = wp.array(cloth.fabric.stretch_rest[None], **f64)
+        stretch.strained = wp.array(cloth.fabric.stretch_strained[None], **f64)
+        stretch.slots = wp.array(cloth.slots(cloth.faces), dtype=wp.int32, device=device)
+        self.stretch = stretch
+
+        bend = BendModel()
+        bend.hinges = wp.array(cloth.hinges, dtype=wp.vec4i, device=device)
+        bend.length = wp.array(cloth.hinge_length, **f64)
+        bend.area = wp.array(cloth.hinge_area, **f64)
+        bend.stiffness = wp.array(cloth.hinge_stiffness, **f64)
+        bend.moment = wp.array(bend_moments(cloth.hinge_stiffness), **f64)
+        bend.slots = wp.array(cloth.slots(cloth.hinges), dtype=wp.int32, device=device)
+        self.bend = bend
+
+        self._strain = wp.zeros(self.num_faces, dtype=strainv, device=device)
+        self._angle = wp.zeros(self.num_hinges, **f64)
+
+    def begin_step(self, x: wp.array) -> None:
+        """Remember strain and angles at `x`, which damping is relative to."""
+        wp.launch(stretch_strain, self.num_faces, [x, self.stretch, self._strain], device=self.device)
+        wp.launch(bend_angle, self.num_hinges, [x, self.bend, self._angle], device=self.device)
+
+    def add_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
+        rate = self.damping * inverse_dt
+        wp.launch(stretch_value, self.num_faces, [x, self.stretch, self._strain, rate, energy], device=self.device)
+        wp.launch(bend_value, self.num_hinges, [x, self.bend, self._angle, rate, energy], device=self.device)
+
+    def add_derivatives(self, x: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix) -> None:
+        rate = self.damping * inverse_dt
+        wp.launch(
+            stretch_derivatives,
+            self.num_faces,
+            [x, self.stretch, self._strain, rate, gradient, matrix.values],
+            device=self.device,
+        )
+        wp.launch(
+            bend_derivatives,
+            self.num_hinges,
+            [x, self.bend, self._angle, rate, gradient, matrix.values],
+            device=self.device,
+        )
+
+
+def principal_stretches(cloth: ClothModel, positions: np.ndarray) -> np.ndarray:
+    """Principal stretches (F, 2), larger first: singular values of the deformation gradient."""
+    corners = positions[cloth.faces]
+    edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    return np.linalg.svd(edges @ cloth.inverse_rest, compute_uv=False)

@@ -1,0 +1,148 @@
+"""Arms held clear of the trunk and the thighs, so that cloth has room between them.
+
+A retargeted arm has the angles of a leaner body and sinks into a fuller one. For each frame and side, the
+point of forearm, hand and lower upper arm that lies deepest asks for a turn of the shoulder that moves it
+out along the trunk's surface normal; turns are widened and smoothed in time, applied, and measured again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from muslin.sim.body.model import BodyModel
+from muslin.sim.motion.motion import Motion
+from muslin.sim.motion.rotations import (
+    axis_angle_from_quaternion,
+    conjugate,
+    multiply,
+    quaternion_from_axis_angle,
+    rotate,
+)
+from muslin.sim.motion.skeleton import JOINT, PARENTS, forward_kinematics, global_rotations
+
+Array = NDArray[np.float64]
+
+CLEARANCE = 0.02
+"""Metres between arm and trunk that spreading aims for."""
+MAX_SPREAD = np.radians(30.0)
+"""Radians: the most a shoulder is turned; hands that hold on to the body stay there."""
+
+_ROUNDS = 6
+_CHECKS_PER_SECOND = 30.0
+_SHORTEST_LEVER = 0.1  # metres: about a shorter one a shoulder would have to turn far
+_EVERY = 3  # of the arm's vertices, a centimetre or so apart, are enough to see how deep it lies
+_UPPER_ARM_FROM = 0.5  # of the way from shoulder to elbow: above it, arm and chest are one flesh
+_TRUNK = ("pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left_knee", "right_knee")
+
+
+@dataclass(frozen=True, eq=False)
+class ArmParts:
+    """vertices: arm vertices of one side (n,); faces: (F, 3) of trunk and thighs, in the body's indices."""
+
+    vertices: NDArray[np.intp]
+    faces: NDArray[np.int32]
+
+
+def arm_parts(body: BodyModel, side: str) -> ArmParts:
+    part = np.argmax(body.weights, axis=1)
+    rest, joints = body.v_template, body.joint_template
+    shoulder, elbow = JOINT[f"{side}_shoulder"], JOINT[f"{side}_elbow"]
+    bone = joints[elbow] - joints[shoulder]
+    along = (rest - joints[shoulder]) @ bone / (bone @ bone)
+    lower = np.isin(part, [elbow, JOINT[f"{side}_wrist"], JOINT[f"{side}_hand"]])
+    upper = (part == shoulder) & (along > _UPPER_ARM_FROM)
+    trunk = np.isin(part, [JOINT[name] for name in _TRUNK])
+    return ArmParts(np.flatnonzero(lower | upper)[::_EVERY], body.faces[trunk[body.faces].all(axis=1)])
+
+
+def clearances(vertices: Array, parts: ArmParts) -> tuple[Array, Array]:
+    """Signed distances (n,) of the arm's vertices to the trunk, inside negative, and outward directions (n, 3).
+
+    The trunk's surface is open at neck and shoulders; its generalised winding number still tells inside
+    from outside away from those holes.
+    """
+    points = np.ascontiguousarray(vertices[parts.vertices])
+    used, faces = np.unique(parts.faces, return_inverse=True)
+    surface, faces = np.ascontiguousarray(vertices[used]), faces.reshape(-1, 3).astype(np.int64)
+    squared, _, nearest = igl.point_mesh_squared_distance(points, surface, faces)
+    inside = igl.fast_winding_number(surface, faces, points) > 0.5
+    sign = np.where(inside, -1.0, 1.0)
+    distance = np.sqrt(squared)
+    outward = (points - nearest) * (sign / np.maximum(distance, 1e-9))[:, None]
+    return sign * distance, outward
+
+
+def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, float]]:
+    """`motion` with arms clear of the trunk as far as MAX_SPREAD allows, and the figures:
+
+    arm_spread_left / _right    largest turn of each shoulder, radians
+    depth_before / depth        deepest arm vertex inside trunk or thighs before and after, metres
+    """
+    figures = {"depth_before": 0.0, "depth": 0.0}
+    for side in ("left", "right"):
+        parts = arm_parts(body, side)
+        shoulder = JOINT[f"{side}_shoulder"]
+        turn = np.zeros((motion.num_frames, 3))
+        need, distance = np.zeros((motion.num_frames, 3)), np.zeros(motion.num_frames)
+        changed = np.arange(0, motion.num_frames, max(round(motion.fps / _CHECKS_PER_SECOND), 1))
+        checked, spread = changed, motion
+        for round_number in range(_ROUNDS + 1):
+            for frame in changed:
+                need[frame], distance[frame] = _turn(spread, int(frame), body, parts, shoulder)
+            deepest = max(0.0, -float(distance[checked].min()))
+            if round_number == 0:
+                figures["depth_before"] = max(figures["depth_before"], deepest)
+            if round_number == _ROUNDS or not need.any():
+                break
+            turn = _limited(turn + _widened(need, motion.fps))
+            spread = _turned(motion, turn, shoulder)
+            changed = checked[np.linalg.norm(turn[checked], axis=1) > 1e-6]
+        figures["depth"] = max(figures["depth"], deepest)
+        figures[f"arm_spread_{side}"] = float(np.linalg.norm(turn, axis=1).max())
+        motion = spread
+    return motion, figures
+
+
+def _turn(
+    motion: Motion, frame: int, body: BodyModel, parts: ArmParts, shoulder: int
+) -> tuple[Array, float]:
+    """The turn (3,) the frame's deepest arm vertex asks for, in the collar's frame, and its distance."""
+    pose, translation = motion.poses[frame], motion.translations[frame]
+    vertices = body.vertices(None, pose, translation)
+    distance, outward = clearances(vertices, parts)
+    worst = int(np.argmin(distance))
+    if distance[worst] >= CLEARANCE:
+        return np.zeros(3), float(distance[worst])
+    pivot = forward_kinematics(pose, body.joint_template, translation)[shoulder]
+    axis = np.cross(vertices[parts.vertices[worst]] - pivot, outward[worst])
+    lever = float(np.linalg.norm(axis))
+    angle = np.arctan((CLEARANCE - distance[worst]) / max(lever, _SHORTEST_LEVER))
+    collar = conjugate(global_rotations(pose)[PARENTS[shoulder]])
+    return rotate(collar, axis / max(lever, 1e-9)) * angle, float(distance[worst])
+
+
+def _widened(turns: Array, fps: float) -> Array:
+    """Each frame's turn carried to its neighbours and smoothed, so that arms move away and back softly."""
+    radius = max(round(0.1 * fps), 1)
+    length = np.linalg.norm(turns, axis=1)
+    padded = np.pad(length, radius, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1)
+    strongest = np.clip(np.arange(len(turns)) + np.argmax(windows, axis=1) - radius, 0, len(turns) - 1)
+    return gaussian_filter1d(turns[strongest], radius / 2.0, axis=0, mode="nearest")
+
+
+def _limited(turns: Array) -> Array:
+    length = np.linalg.norm(turns, axis=1, keepdims=True)
+    return turns * np.minimum(1.0, MAX_SPREAD / np.maximum(length, 1e-9))
+
+
+def _turned(motion: Motion, turns: Array, shoulder: int) -> Motion:
+    poses = motion.poses.copy()
+    local = multiply(quaternion_from_axis_angle(turns), motion.quaternions[:, shoulder])
+    poses[:, shoulder] = axis_angle_from_quaternion(local)
+    return motion._with(poses, motion.translations)

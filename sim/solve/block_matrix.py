@@ -1,0 +1,73 @@
+"""Sparse symmetric matrix of 3 x 3 blocks: a fixed pattern plus a short list of blocks outside it.
+
+The pattern holds the elastic stencils; only self-contact couples vertices beyond it, and those blocks go to a
+list, (i, j) and (j, i) both.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class BlockMatrix:
+    """Rows `offsets` (V + 1,), `columns` (nnz,) ascending, `values` (nnz,); list `extra_*` of `extra_count[0]` blocks.
+
+    `extra_count` runs on past the capacity of the list, so that the caller can see by how much it was too short.
+    """
+
+    offsets: wp.array(dtype=wp.int32)
+    columns: wp.array(dtype=wp.int32)
+    values: wp.array(dtype=wp.mat33d)
+    diagonal: wp.array(dtype=wp.int32)
+    extra_count: wp.array(dtype=wp.int32)
+    extra_index: wp.array(dtype=wp.vec2i)
+    extra_values: wp.array(dtype=wp.mat33d)
+
+
+@wp.func
+def find_slot(matrix: BlockMatrix, i: int, j: int) -> int:
+    """Position of (i, j) in the pattern, or -1."""
+    low = matrix.offsets[i]
+    high = matrix.offsets[i + 1] - 1
+    while low <= high:
+        middle = (low + high) / 2
+        column = matrix.columns[middle]
+        if column == j:
+            return middle
+        if column < j:
+            low = middle + 1
+        else:
+            high = middle - 1
+    return -1
+
+
+@wp.func
+def add_block(matrix: BlockMatrix, i: int, j: int, block: wp.mat33d):
+    if i == j:
+        wp.atomic_add(matrix.values, matrix.diagonal[i], block)
+    else:
+        slot = find_slot(matrix, i, j)
+        if slot >= 0:
+            wp.atomic_add(matrix.values, slot, block)
+        else:
+            k = wp.atomic_add(matrix.extra_count, 0, 1)
+            if k < matrix.extra_index.shape[0]:
+                matrix.extra_index[k] = wp.vec2i(i, j)
+                matrix.extra_values[k] = block
+
+
+@wp.kernel
+def add_diagonal(matrix: BlockMatrix, weight: wp.array(dtype=wp.float64)):
+    """Adds weight[i] I to block (i, i)."""
+    i = wp.tid()
+    wp.atomic_add(matrix.values, matrix.diagonal[i], wp.identity(n=3, dtype=wp.float64) * weight[i])
+
+
+@wp.func
+def row_product(matrix: BlockMatrix, i: int, x: wp.array(dtype=wp.vec3d)) -> wp.vec3d:
+    """Row i of the pattern times x."""
+    total = wp.vec3d()
+    for k in range(matrix.offsets[i], matrix.offsets[i + 1]):
+        total += matrix.values[k] * x[matrix.columns[k]]
+    return total

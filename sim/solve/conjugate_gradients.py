@@ -1,0 +1,87 @@
+"""Preconditioned conjugate gradients for A p = -g, whole in one serial kernel, for the CPU.
+
+The iteration stops when the quadratic model q(p) = p.A p / 2 + g.p no longer pays for itself: after at least
+8 iterations, when the last decrease times the number of iterations is below `tolerance` times the whole decrease.
+
+Source: Nash, Sofer 1990, "Assessing a search direction within a truncated-Newton method".
+"""
+
+import warp as wp
+
+from muslin.sim.solve.block_matrix import BlockMatrix, row_product
+from muslin.sim.solve.incomplete_cholesky import LowerFactor, apply_inverse, factorise
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Workspace:
+    r: wp.array(dtype=wp.vec3d)
+    z: wp.array(dtype=wp.vec3d)
+    d: wp.array(dtype=wp.vec3d)
+    q: wp.array(dtype=wp.vec3d)
+
+
+@wp.kernel
+def solve_serial(
+    matrix: BlockMatrix,
+    factor: LowerFactor,
+    gradient: wp.array(dtype=wp.vec3d),
+    p: wp.array(dtype=wp.vec3d),
+    work: Workspace,
+    shift: wp.float64,
+    tolerance: wp.float64,
+    max_iterations: int,
+    report: wp.array(dtype=wp.float64),
+):
+    """Launch with dim = 1. report = [iterations, shift used, q(p), |r| at the end / |g|]."""
+    n = matrix.diagonal.shape[0]
+    extras = wp.min(matrix.extra_count[0], matrix.extra_index.shape[0])
+    used = factorise(matrix, factor, shift)
+    start = wp.float64(0.0)
+    for i in range(n):
+        work.r[i] = -gradient[i]
+        p[i] = wp.vec3d()
+        start += wp.length_sq(gradient[i])
+    apply_inverse(factor, work.r, work.z)
+    rz = wp.float64(0.0)
+    for i in range(n):
+        work.d[i] = work.z[i]
+        rz += wp.dot(work.r[i], work.z[i])
+    decrease = wp.float64(0.0)
+    iterations = int(0)
+    while iterations < max_iterations and rz > wp.float64(0.0):
+        for i in range(n):
+            work.q[i] = row_product(matrix, i, work.d)
+        for e in range(extras):
+            ij = matrix.extra_index[e]
+            work.q[ij[0]] = work.q[ij[0]] + matrix.extra_values[e] * work.d[ij[1]]
+        dq = wp.float64(0.0)
+        for i in range(n):
+            dq += wp.dot(work.d[i], work.q[i])
+        if not (dq > wp.float64(0.0)):
+            break
+        alpha = rz / dq
+        for i in range(n):
+            p[i] = p[i] + work.d[i] * alpha
+            work.r[i] = work.r[i] - work.q[i] * alpha
+        iterations += 1
+        gain = wp.float64(0.5) * alpha * rz
+        decrease += gain
+        if iterations >= 8 and wp.float64(iterations) * gain < tolerance * decrease:
+            break
+        apply_inverse(factor, work.r, work.z)
+        next_rz = wp.float64(0.0)
+        for i in range(n):
+            next_rz += wp.dot(work.r[i], work.z[i])
+        beta = next_rz / rz
+        rz = next_rz
+        for i in range(n):
+            work.d[i] = work.z[i] + work.d[i] * beta
+    end = wp.float64(0.0)
+    for i in range(n):
+        end += wp.length_sq(work.r[i])
+    report[0] = wp.float64(iterations)
+    report[1] = used
+    report[2] = -decrease
+    report[3] = wp.sqrt(end / wp.max(start, wp.float64(1.0e-300)))

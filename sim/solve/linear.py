@@ -1,0 +1,74 @@
+"""The Newton system on a device: storage of the block matrix and its solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from muslin.sim.cloth import ClothModel
+from muslin.sim.solve.block_matrix import BlockMatrix, add_diagonal
+from muslin.sim.solve.conjugate_gradients import Workspace, solve_serial
+from muslin.sim.solve.incomplete_cholesky import MAX_SHIFT, LowerFactor
+
+
+class LinearSystem:
+    """Matrix A in the pattern of a cloth and the solution of A p = -g."""
+
+    def __init__(self, cloth: ClothModel, device: str, shift: float = 0.005) -> None:
+        self.device = device
+        n = cloth.num_vertices
+        offsets, columns = cloth.pattern
+        rows = np.repeat(np.arange(n), np.diff(offsets))
+        m = BlockMatrix()
+        m.offsets = wp.array(offsets, dtype=wp.int32, device=device)
+        m.columns = wp.array(columns, dtype=wp.int32, device=device)
+        m.values = wp.zeros(len(columns), dtype=wp.mat33d, device=device)
+        m.diagonal = wp.array(np.flatnonzero(rows == columns), dtype=wp.int32, device=device)
+        m.extra_count = wp.zeros(1, dtype=wp.int32, device=device)
+        self.matrix = m
+        self._reserve_extras(16 * n)
+
+        lower = np.flatnonzero(columns < rows)
+        f = LowerFactor()
+        f.offsets = wp.array(np.searchsorted(rows[lower], np.arange(n + 1)), dtype=wp.int32, device=device)
+        f.columns = wp.array(columns[lower], dtype=wp.int32, device=device)
+        f.source = wp.array(lower, dtype=wp.int32, device=device)
+        f.values = wp.zeros(len(lower), dtype=wp.mat33d, device=device)
+        f.inverse = wp.zeros(n, dtype=wp.mat33d, device=device)
+        self.factor = f
+        self.smallest_shift = shift
+        self.shift = shift
+
+        w = Workspace()
+        for name in ("r", "z", "d", "q"):
+            setattr(w, name, wp.zeros(n, dtype=wp.vec3d, device=device))
+        self.work = w
+        self.report = wp.zeros(4, dtype=wp.float64, device=device)
+
+    def clear(self) -> None:
+        self.matrix.values.zero_()
+        self.matrix.extra_count.zero_()
+
+    def add_diagonal(self, weight: wp.array) -> None:
+        wp.launch(add_diagonal, len(weight), [self.matrix, weight], device=self.device)
+
+    def extras_fit(self) -> bool:
+        """False where the list of blocks outside the pattern was too short: it has grown, assemble again."""
+        count = int(self.matrix.extra_count.numpy()[0])
+        if count <= len(self.matrix.extra_index):
+            return True
+        self._reserve_extras(2 * count)
+        return False
+
+    def solve(self, gradient: wp.array, p: wp.array, tolerance: float, max_iterations: int) -> int:
+        """Fill p's first V entries; returns the number of iterations."""
+        args = [self.matrix, self.factor, gradient, p, self.work, self.shift, tolerance, max_iterations, self.report]
+        wp.launch(solve_serial, 1, args, device=self.device)
+        iterations, used = self.report.numpy()[:2]
+        # The next matrix is much like this one: start from half the shift that worked, not from the smallest.
+        self.shift = max(self.smallest_shift, 0.5 * min(float(used), MAX_SHIFT / 8.0))
+        return int(iterations)
+
+    def _reserve_extras(self, capacity: int) -> None:
+        self.matrix.extra_index = wp.zeros(capacity, dtype=wp.vec2i, device=self.device)
+        self.matrix.extra_values = wp.zeros(capacity, dtype=wp.mat33d, device=self.device)

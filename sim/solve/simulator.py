@@ -1,0 +1,271 @@
+"""Implicit time stepping of one cloth among a moving collider, without ever passing through anything.
+
+A step minimises the incremental potential
+
+    E(x) = sum m |x - t|^2 (1 + a dt) / (2 dt^2) - m g.x + W_stretch + W_bend + B_contact + D_friction
+
+by projected Newton: positive semi-definite Hessian, preconditioned conjugate gradients, every move limited by
+continuous collision detection and backtracked until E falls. Collider vertices move along with the iterations:
+what they still have to travel enters the Newton direction, so that the cloth is carried, and the part that a safe
+step allows is made.
+
+Sources: Li et al. 2020 (incremental potential contact); Gast, Schroeder 2014 (optimisation integrators).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from muslin.sim.cloth import ClothModel
+from muslin.sim.contact.system import ContactSettings, ContactSystem
+from muslin.sim.elastic import ElasticEnergy
+from muslin.sim.solve.errors import SimulationError
+from muslin.sim.solve.inertia import quadratic_gradient, quadratic_value, step_along
+from muslin.sim.solve.linear import LinearSystem
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m: largest
+    Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton once the
+    collider has arrived, `max_advances` before; `max_move` m an iteration; `linear_tolerance` of
+    `muslin.sim.solve.conjugate_gradients`."""
+
+    gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
+    damping: float = 2.0e-3
+    drag: float = 0.5
+    tolerance: float = 2.0e-4
+    min_iterations: int = 2
+    max_iterations: int = 8
+    max_advances: int = 40
+    max_move: float = 0.03
+    max_backtracks: int = 12
+    linear_tolerance: float = 0.1
+    max_linear_iterations: int = 400
+    max_splits: int = 4
+
+
+@dataclass
+class StepReport:
+    """Work of one time step: Newton and linear iterations, the last move (m), whether it met the tolerance."""
+
+    newton: int = 0
+    linear: int = 0
+    splits: int = 0
+    last_move: float = 0.0
+    converged: bool = False
+
+
+class ClothSimulator:
+    """State of one cloth and one collider: positions, velocities, time stepping.
+
+    `positions` (V, 3) and `collider_vertices` (N, 3), metres, must not intersect.
+    """
+
+    def __init__(
+        self,
+        cloth: ClothModel,
+        positions: NDArray[np.float64],
+        collider_vertices: NDArray[np.float64],
+        collider_faces: NDArray[np.int32],
+        contact: ContactSettings | None = None,
+        solver: SolverSettings | None = None,
+        device: str = "cpu",
+    ) -> None:
+        self.cloth = cloth
+        self.settings = solver or SolverSettings()
+        self.device = device
+        n = cloth.num_vertices
+        self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
+        self.contact = ContactSystem(cloth, collider_faces, collider_vertices, contact or ContactSettings(), device)
+        self.linear = LinearSystem(cloth, device)
+        total = n + len(collider_vertices)
+        vec = {"dtype": wp.vec3d, "device": device}
+        self.x = wp.array(np.concatenate([positions, collider_vertices]), **vec)
+        self.start = wp.zeros(total, **vec)
+        self.trial = wp.zeros(total, **vec)
+        self.p = wp.zeros(total, **vec)
+        self.remaining = wp.zeros(total, **vec)
+        self.target = wp.zeros(n, **vec)
+        self.gradient = wp.zeros(n, **vec)
+        self.weight = wp.zeros(n, dtype=wp.float64, device=device)
+        self.mass = wp.array(cloth.mass, dtype=wp.float64, device=device)
+        self._scalar = wp.zeros(1, dtype=wp.float64, device=device)
+        self.velocity = np.zeros((n, 3))
+        self.pins = np.zeros(n, bool)
+        self._gravity = wp.vec3d(*self.settings.gravity)
+        self.contact.search(self.x, self.p)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(V, 3) cloth positions, metres (a copy)."""
+        return self.x.numpy()[: self.cloth.num_vertices].copy()
+
+    @property
+    def collider_vertices(self) -> NDArray[np.float64]:
+        """(N, 3) collider positions, metres (a copy)."""
+        return self.x.numpy()[self.cloth.num_vertices :].copy()
+
+    def advance(
+        self,
+        collider_target: NDArray[np.float64] | None,
+        dt: float,
+        *,
+        inertia: bool = True,
+        friction: bool = True,
+        pin_targets: NDArray[np.float64] | None = None,
+    ) -> StepReport:
+        """One time step of `dt` seconds while the collider moves to `collider_target` (N, 3) in a straight line.
+
+        Without `inertia` the velocity starts from rest: a proximal step towards equilibrium. A step in which the
+        collider cannot arrive is retried as two half steps, up to `max_splits` deep; then SimulationError.
+        """
+        goal = self.collider_vertices if collider_target is None else collider_target
+        saved_x, saved_v = self.x.numpy().copy(), self.velocity.copy()
+        report = StepReport()
+        try:
+            self._advance(goal, dt, inertia, friction, pin_targets, report, self.settings.max_splits)
+        except SimulationError:
+            self.restore(saved_x, saved_v)
+            raise
+        return report
+
+    def restore(self, x: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
+        """Put the joint vertex array (V + N, 3) and the velocities back to a saved, intersection-free state."""
+        self.x.assign(x)
+        self.velocity = velocity.copy()
+        self.p.zero_()
+        self.contact.search(self.x, self.p)
+
+    def _advance(
+        self,
+        goal: NDArray[np.float64],
+        dt: float,
+        inertia: bool,
+        friction: bool,
+        pin_targets: NDArray[np.float64] | None,
+        report: StepReport,
+        splits: int,
+    ) -> None:
+        saved_x, saved_v = self.x.numpy().copy(), self.velocity.copy()
+        if self._minimise(goal, dt, inertia, friction, pin_targets, report):
+            return
+        if splits == 0:
+            blocked = self.remaining.numpy()[self.cloth.num_vertices :]
+            worst = int(np.argmax(np.linalg.norm(blocked, axis=1)))
+            raise SimulationError(
+                f"the collider cannot move on without touching the cloth: its vertex {worst} is still "
+                f"{np.linalg.norm(blocked[worst]) * 1e3:.2f} mm short after {self.settings.max_splits} halvings of "
+                f"the step; use a smaller time step, a looser garment or a slower motion"
+            )
+        self.restore(saved_x, saved_v)
+        report.splits += 1
+        middle = 0.5 * (saved_x[self.cloth.num_vertices :] + goal)
+        self._advance(middle, 0.5 * dt, inertia, friction, pin_targets, report, splits - 1)
+        self._advance(goal, 0.5 * dt, inertia, friction, pin_targets, report, splits - 1)
+
+    def _minimise(
+        self,
+        goal: NDArray[np.float64],
+        dt: float,
+        inertia: bool,
+        friction: bool,
+        pin_targets: NDArray[np.float64] | None,
+        report: StepReport,
+    ) -> bool:
+        """The Newton iterations of one step; False if the collider does not arrive."""
+        s = self.settings
+        n = self.cloth.num_vertices
+        begin = self.x.numpy().copy()
+        self.start.assign(begin)
+        self.elastic.begin_step(self.x)
+        self.contact.begin_step(self.x, dt, friction)
+        self._set_inertia(begin[:n], dt, inertia, pin_targets)
+        remaining = np.zeros_like(begin)
+        remaining[n:] = goal - begin[n:]
+        moving = bool(np.abs(remaining).max(initial=0.0) > 0.0)
+        fraction = 1.0
+        iterations = advances = 0
+        while True:
+            self.remaining.assign(remaining * fraction)
+            self._assemble(1.0 / dt)
+            report.linear += self.linear.solve(self.gradient, self.p, s.linear_tolerance, s.max_linear_iterations)
+            report.newton += 1
+            p = self.p.numpy()
+            p[n:] = remaining[n:] * fraction
+            size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
+            if not np.isfinite(size):
+                raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
+            limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
+            self.p.assign(p * limit)
+            self.contact.search(self.x, self.p)
+            safe = self.contact.largest_step(self.x, self.p, self._scalar)
+            if moving:
+                self._move(safe)
+                fraction *= 1.0 - safe
+                advances += 1
+                if safe >= 1.0 or fraction < 1e-9:
+                    moving = False
+                elif advances >= s.max_advances:
+                    return False
+            else:
+                step = self._line_search(safe, 1.0 / dt)
+                iterations += 1
+                report.last_move = step * limit * size
+                report.converged = report.last_move < s.tolerance
+                if (report.converged and iterations >= s.min_iterations) or iterations >= s.max_iterations:
+                    break
+        self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
+        return True
+
+    def _set_inertia(
+        self, begin: NDArray[np.float64], dt: float, inertia: bool, pin_targets: NDArray[np.float64] | None
+    ) -> None:
+        drag = 1.0 + self.settings.drag * dt
+        weight = self.cloth.mass / dt**2 * drag
+        target = begin + (dt / drag) * self.velocity if inertia else begin.copy()
+        if pin_targets is not None:
+            # Stiff enough to hold against any fabric, soft enough for double precision.
+            weight[self.pins] = 1.0e6
+            target[self.pins] = pin_targets[self.pins]
+        self.weight.assign(weight)
+        self.target.assign(target)
+
+    def _assemble(self, inverse_dt: float) -> None:
+        while True:
+            self.linear.clear()
+            self.gradient.zero_()
+            args = [self.x, self.target, self.weight, self.mass, self._gravity, self.gradient]
+            wp.launch(quadratic_gradient, self.cloth.num_vertices, args, device=self.device)
+            self.linear.add_diagonal(self.weight)
+            self.elastic.add_derivatives(self.x, inverse_dt, self.gradient, self.linear.matrix)
+            self.contact.add_derivatives(self.x, self.start, self.remaining, self.gradient, self.linear.matrix)
+            if self.linear.extras_fit():
+                return
+
+    def _energy(self, x: wp.array, inverse_dt: float) -> float:
+        self._scalar.zero_()
+        args = [x, self.target, self.weight, self.mass, self._gravity, self._scalar]
+        wp.launch(quadratic_value, self.cloth.num_vertices, args, device=self.device)
+        self.elastic.add_value(x, inverse_dt, self._scalar)
+        self.contact.add_value(x, self.start, self._scalar)
+        return float(self._scalar.numpy()[0])
+
+    def _move(self, step: float) -> None:
+        wp.launch(step_along, len(self.x), [self.x, self.p, step, self.trial], device=self.device)
+        self.x, self.trial = self.trial, self.x
+
+    def _line_search(self, step: float, inverse_dt: float) -> float:
+        """Backtrack from `step` until the energy falls; zero if it never does."""
+        before = self._energy(self.x, inverse_dt)
+        for _ in range(self.settings.max_backtracks):
+            wp.launch(step_along, len(self.x), [self.x, self.p, step, self.trial], device=self.device)
+            if self._energy(self.trial, inverse_dt) < before:
+                self.x, self.trial = self.trial, self.x
+                return step
+            step *= 0.5
+        return 0.0
