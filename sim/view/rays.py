@@ -49,15 +49,12 @@ def lit_share(
     point is in shadow if something is hit more than `tolerance` metres before it.
     """
     reach = 2.0 * float(np.linalg.norm(np.ptp(np.concatenate([vertices, points]), axis=0))) + 1.0
-    seen = np.zeros(len(points))
-    for light in lights:
-        origins = points + reach * light
-        hits = cast(origins, np.broadcast_to(-light, points.shape).copy(), vertices, faces)
-        hit = hits.face >= 0
-        corners = vertices[faces[hits.face[hit]]]
-        where = np.einsum("nk,nkd->nd", hits.weights[hit], corners)
-        distance = np.einsum("nd,d->n", origins[hit] - where, light)
-        lit = np.ones(len(points))
-        lit[hit] = distance >= reach - tolerance
-        seen += lit
-    return seen / len(lights)
+    towards = np.repeat(lights, len(points), axis=0)
+    origins = np.tile(points, (len(lights), 1)) + reach * towards
+    hits = cast(origins, -towards, vertices, faces)
+    hit = hits.face >= 0
+    where = np.einsum("nk,nkd->nd", hits.weights[hit], vertices[faces[hits.face[hit]]])
+    distance = np.einsum("nd,nd->n", origins[hit] - where, towards[hit])
+    lit = np.ones(len(origins))
+    lit[hit] = distance >= reach - tolerance
+    return lit.reshape(len(lights), len(points)).mean(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def show(sample: Sample) -> None:
     require_display()
     import pyvista as pv
 
-    plotter = pv.Plotter(title=f"muslin: {sample.id}", window_size=[900, 1100], lighting="three lights")
+    plotter: Any = pv.Plotter(title=f"muslin: {sample.id}", window_size=[900, 1100], lighting="three lights")
     plotter.set_background("#f4f3f0", top="#ffffff")
     meshes = []
     for layer in sample_layers(sample, 0):
