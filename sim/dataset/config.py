@@ -25,7 +25,7 @@ clip = "cmu_07_01"
 end = 4.0
 designs = ["tshirt"]
 
-[splits.test]                                   # the first split that names a sample takes it; the rest is "train"
+[splits.test]                                   # the first that names a sample takes it; the rest is "train"
 designs = ["random-019"]
 [splits.validation]
 by = "shape"
@@ -62,7 +62,8 @@ class RandomDesigns(_Strict):
 
 
 class Design(_Strict):
-    """One garment, or with `random` many: catalogue design, preset, parameters that override the preset (metres)."""
+    """One garment, or with `random` many: catalogue design, preset, parameters that override the preset
+    (metres)."""
 
     name: Name | None = None
     design: str = "tee"
@@ -228,10 +229,7 @@ def _set(values: dict[str, Any], override: str) -> None:
 
 
 def _step(table: Any, part: str, override: str) -> Any:
-    if isinstance(table, list):
-        entry = table[_place(table, part, override)]
-    else:
-        entry = table.setdefault(part, {})
+    entry = table[_place(table, part, override)] if isinstance(table, list) else table.setdefault(part, {})
     if not isinstance(entry, dict | list):
         raise InputError(f"--set {override!r}: {part} is a value, not a table; give the key of a value")
     return entry

@@ -52,7 +52,7 @@ def exclusive(lock: Path) -> Iterator[None]:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise InputError(
-                f"{lock.parent}: another process is writing this dataset; wait for it to end, or write elsewhere"
+                f"{lock.parent}: another process is writing here; wait for its end, or write elsewhere"
             ) from error
         yield
 

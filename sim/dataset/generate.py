@@ -33,7 +33,8 @@ FrameProgress = Callable[[int, int], None]
 """(work done, work in all) of one chain."""
 
 ChainSimulator = Callable[[list[Any], str, FrameProgress | None], Iterator[Sample]]
-"""(scenes of a chain, device, progress) -> the samples in order. Must be importable by name in another process."""
+"""(scenes of a chain, device, progress) -> the samples in order. Must be importable by name in another
+process."""
 
 
 class Progress(Protocol):
@@ -79,16 +80,17 @@ def generate(
 ) -> GenerateReport:
     """Make every planned sample that is not there yet.
 
-    The same configuration gives the same ids and, on one machine, the same bytes of geometry, whatever the number of
-    workers and however often the run was killed: a sample is committed whole or not at all, and a chain of drapes of
-    which any is missing is made again from its start.
+    The same configuration gives the same ids and, on one machine, the same bytes of geometry, whatever the
+    number of workers and however often the run was killed: a sample is committed whole or not at all, and a
+    chain of drapes of which any is missing is made again from its start.
 
     workers      processes; by default one a usable core on the CPU, one on a GPU
     simulate     `muslin.sim.run.simulate_chain` unless given
     make_scene   what turns the values of a scene file into a scene; `Scene.model_validate` unless given
 
-    A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a scene
-    that cannot be, for a folder that may not be written to (see `prepare_root`), and when a process dies.
+    A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a
+    scene that cannot be, for a folder that may not be written to (see `prepare_root`), and when a process
+    dies.
     """
     root = Path(out)
     started = time.perf_counter()
@@ -122,7 +124,8 @@ def generate(
 
 def solver_digest(simulate: ChainSimulator | None = None) -> str:
     """sha256 over the sources and data that decide the geometry: `muslin.garments` and `muslin.sim` (without
-    `dataset`, `view` and the tools that bake assets), or the module of another simulator; with the versions installed.
+    `dataset`, `view` and the tools that bake assets), or the module of another simulator; with the versions
+    installed.
     """
     total = hashlib.sha256(canonical(Header(config={}, splits={}).versions))
     if simulate is not None:
@@ -152,7 +155,7 @@ def _check_solver(root: Path, before: Header | None, header: Header, missing: bo
         if before.versions.get(key) != value
     ]
     raise InputError(
-        f"{root}: its samples were made by another version of the solver ({', '.join(changed) or 'its code changed'}); "
+        f"{root}: its samples were made by another solver ({', '.join(changed) or 'its code changed'}); "
         "one dataset holds the samples of one solver: write to another folder"
     )
 
@@ -242,7 +245,8 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEX
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """One thread a process: faster with a process a core, and sums no longer depend on the number of threads."""
+    """One thread a process: faster with a process a core, and sums no longer depend on the number of
+    threads."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:

@@ -39,7 +39,8 @@ def installed_versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Header:
-    """config: what the dataset was made from; splits: {sample id: split} of every planned sample, in plan order."""
+    """config: what the dataset was made from; splits: {sample id: split} of every planned sample, in plan
+    order."""
 
     config: dict[str, Any]
     splits: dict[str, str]
@@ -59,7 +60,8 @@ class Header:
 def read_header(root: Path) -> Header:
     """The header of a dataset.
 
-    Raises InputError if the folder is no dataset, its header is damaged, or its schema is newer than this program.
+    Raises InputError if the folder is no dataset, its header is damaged, or its schema is newer than this
+    program.
     """
     path = root / HEADER
     if not path.is_file():
@@ -77,8 +79,8 @@ def read_header(root: Path) -> Header:
         raise InputError(f"{path}: schema_version = {found!r} is not a whole number; {_RESTORE}")
     if found > SCHEMA_VERSION:
         raise InputError(
-            f"{path}: schema_version = {found} is newer than {SCHEMA_VERSION}, the newest that this program reads; "
-            "update muslin (pip install -U muslin)"
+            f"{path}: schema_version = {found} is newer than {SCHEMA_VERSION}, the newest that this "
+            "program reads; update muslin (pip install -U muslin)"
         )
     try:
         return Header(**values)
@@ -89,8 +91,8 @@ def read_header(root: Path) -> Header:
 def prepare_root(root: Path, header: Header) -> Header | None:
     """Make a folder ready to hold the samples of a header; return the header that was there before, if any.
 
-    Raises InputError, touching nothing, if the folder holds anything but a dataset, or a dataset of which some planned
-    sample is not planned by the new header: only an extension may go on in the same folder.
+    Raises InputError, touching nothing, if the folder holds anything but a dataset, or a dataset of which
+    some planned sample is not planned by the new header: only an extension may go on in the same folder.
     """
     if root.exists() and not root.is_dir():
         raise InputError(f"{root}: is a file; give a folder for the dataset")
@@ -98,7 +100,8 @@ def prepare_root(root: Path, header: Header) -> Header | None:
         strangers = sorted(p.name for p in root.iterdir() if not _own(p.name))
         if strangers:
             raise InputError(
-                f"{root}: not empty ({', '.join(strangers[:3])}…) and no muslin dataset; give an empty or new folder"
+                f"{root}: not empty ({', '.join(strangers[:3])}…) and no muslin dataset; "
+                "give an empty or new folder"
             )
     before = read_header(root) if (root / HEADER).exists() else None
     if before is not None:
@@ -106,8 +109,8 @@ def prepare_root(root: Path, header: Header) -> Header | None:
         if dropped:
             differs = describe_difference(before.config, header.config) or "the way samples are named"
             raise InputError(
-                f"{root}: holds a dataset of another config, {len(dropped)} of whose {len(before.splits)} samples "
-                f"the new one has not; differs: {differs}; write to another folder, or only extend the config"
+                f"{root}: holds a dataset of another config, {len(dropped)} of whose "
+                f"{len(before.splits)} samples the new one has not; differs: {differs}; write to another folder, or only extend the config"
             )
     (root / SAMPLES).mkdir(parents=True, exist_ok=True)
     (root / PARTIAL).mkdir(exist_ok=True)

@@ -89,8 +89,8 @@ def write_index(root: Path, header: Header) -> None:
 def read_index(root: Path, header: Header) -> list[dict[str, Any]]:
     """Rows of all samples, in plan order.
 
-    Rows that the index lacks (a run was killed before it wrote them) are read from the samples; a row whose sample is
-    gone is kept, so that the loss is seen. Raises InputError if the index or a sample is damaged.
+    Rows that the index lacks (a run was killed before it wrote them) are read from the samples; a row whose
+    sample is gone is kept, so that the loss is seen. Raises InputError if the index or a sample is damaged.
     """
     rows = {entry["id"]: entry for entry in _stored_rows(root)}
     ids = in_plan_order(header, {*rows, *store.stored_ids(root)})

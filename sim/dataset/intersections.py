@@ -1,7 +1,8 @@
 """Exact intersections of cloth with itself and with a body, by IPC Toolkit.
 
-A pair is an edge and a triangle without a common vertex that meet; ipctk decides it with Shewchuk's exact orientation
-predicates, so a count of zero means that no two triangles cross. Pairs within the body are left out.
+A pair is an edge and a triangle without a common vertex that meet; ipctk decides it with Shewchuk's exact
+orientation predicates, so a count of zero means that no two triangles cross. Pairs within the body are left
+out.
 """
 
 from __future__ import annotations
@@ -42,11 +43,14 @@ def count_intersections(
 
 
 def _overlaps(triangles: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Which triangles (M, 3, 3) have a bounding box that meets the box [low, high]: no other can touch the cloth."""
+    """Which triangles (M, 3, 3) have a bounding box that meets the box [low, high]: no other can touch the
+    cloth."""
     return np.logical_and((triangles.max(axis=1) >= low), (triangles.min(axis=1) <= high)).all(axis=1)
 
 
-def _count_pairs(vertices: np.ndarray, edges: np.ndarray, faces: np.ndarray, n_cloth: int) -> IntersectionCounts:
+def _count_pairs(
+    vertices: np.ndarray, edges: np.ndarray, faces: np.ndarray, n_cloth: int
+) -> IntersectionCounts:
     broad_phase = ipctk.LBVH()
     broad_phase.can_vertices_collide = ipctk.make_static_obstacle_filter(n_cloth)
     extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))

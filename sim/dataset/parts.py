@@ -38,7 +38,8 @@ class Part:
 
 
 def sample_parts(sample: Sample, body: bool = True) -> list[Part]:
-    """The cloth of a sample, and the body or obstacle if it has one. A body that stands still repeats each frame."""
+    """The cloth of a sample, and the body or obstacle if it has one. A body that stands still repeats each
+    frame."""
     garment = sample.garment
     parts = [Part("cloth", sample.positions, garment.faces, garment.uv, garment.panel_faces)]
     if body and len(sample.body_faces):
@@ -59,7 +60,9 @@ def read_mesh(path: str | Path) -> Part:
         # force keeps one mesh of a file with groups; process=False keeps the order of the vertices.
         mesh = trimesh.load(file, force="mesh", process=False, maintain_order=True)
     except (ValueError, KeyError, TypeError, IndexError, NotImplementedError, OSError) as error:
-        raise InputError(f"{file}: not readable as a mesh ({error}); give .obj, .ply, .glb, .stl or .off") from error
+        raise InputError(
+            f"{file}: not readable as a mesh ({error}); give .obj, .ply, .glb, .stl or .off"
+        ) from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise InputError(f"{file}: holds no triangle; give a triangle mesh")
     if not np.isfinite(mesh.vertices).all():

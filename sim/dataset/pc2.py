@@ -1,7 +1,7 @@
 """Point Cache 2 files, read by Blender, Maya and 3ds Max.
 
-Little endian: 12 bytes "POINTCACHE2\\0", int32 version 1, int32 points, float32 start frame, float32 sample rate
-(frames of the cache a frame of the scene), int32 samples; then samples x points x 3 float32.
+Little endian: 12 bytes "POINTCACHE2\\0", int32 version 1, int32 points, float32 start frame, float32 sample
+rate (frames of the cache a frame of the scene), int32 samples; then samples x points x 3 float32.
 """
 
 from __future__ import annotations
@@ -34,4 +34,6 @@ def read_pc2(path: str | Path) -> np.ndarray:
     wanted = _HEADER.size + 12 * points * samples
     if len(data) != wanted:
         raise InputError(f"{path}: {len(data)} bytes, its header asks for {wanted}; write the file again")
-    return np.frombuffer(data, dtype="<f4", offset=_HEADER.size).reshape(samples, points, 3).astype(np.float32)
+    return (
+        np.frombuffer(data, dtype="<f4", offset=_HEADER.size).reshape(samples, points, 3).astype(np.float32)
+    )

@@ -1,11 +1,13 @@
-"""From a configuration to the list of samples to make: the same list for the same configuration, on any machine."""
+"""From a configuration to the samples to make: the same list for the same configuration, on any machine."""
 
 from __future__ import annotations
 
 import copy
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,8 @@ MEAN_SHAPE = "mean"
 
 @dataclass(frozen=True)
 class Job:
-    """One sample to make. `scene` are the values of a scene file; `id` ends in a hash of all that makes its geometry."""
+    """One sample to make: the values of its scene, and an id that ends in a hash of all that makes its
+    geometry."""
 
     id: str
     kind: str
@@ -33,7 +36,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Chain:
-    """Jobs made one after the other by one process: drapes along beta, each starting from the last, or one sequence."""
+    """Jobs of one process: drapes along beta, each starting from the one before, or one sequence."""
 
     jobs: tuple[Job, ...]
 
@@ -67,14 +70,12 @@ class _Beta:
 def plan(config: DatasetConfig) -> Plan:
     """All chains of a dataset.
 
-    Raises InputError for names that nothing has, parameters out of range, two samples that are the same, and a
-    configuration without any sample.
+    Raises InputError for names that nothing has, parameters out of range, two samples that are the same, and
+    a configuration without any sample.
     """
     designs = list(_designs(config))
     shapes = list(_shapes(config))
-    clips = [
-        (clip.name or f"{clip.clip}".rsplit("/", 1)[-1].split(".")[0], clip) for clip in config.sequences
-    ]
+    clips = [(clip.name or Path(clip.clip).stem, clip) for clip in config.sequences]
     _check_unique("designs", [garment.name for garment in designs])
     _check_unique("shapes", [shape.name for shape in shapes])
     _check_unique("sequences", [name for name, _ in clips])
@@ -155,7 +156,7 @@ _GARMENT_SOURCES = ("design", "preset", "parameters", "pattern", "mesh")
 def _job(
     config: DatasetConfig, kind: str, scene: dict[str, Any], labels: dict[str, str], identity: dict[str, Any]
 ) -> Job:
-    words = [labels["design"], labels["shape"], labels.get("sequence", "")]
+    words = [re.sub(r"[^A-Za-z0-9-]+", "-", labels.get(key, "")) for key in ("design", "shape", "sequence")]
     sample_id = "_".join([*filter(None, words), digest(identity)[:12]])
     return Job(
         sample_id, kind, scene, {k: v for k, v in labels.items() if v}, _split(config, labels), config.seed
@@ -200,7 +201,8 @@ def _parameters(config: DatasetConfig, place: int, block: Design) -> Iterator[di
             )
     draw = _generator(config.seed, "design", block.name or str(place))
     for _ in range(block.random.count):
-        # One draw for every parameter, ranged or not: adding a range leaves the other parameters' draws as they were.
+        # One draw for every parameter, ranged or not: adding a range leaves the other parameters' draws as
+        # they were.
         u = {key: draw.random() for key in family.parameters}
         drawn = {key: _between(low, high, u[key]) for key, (low, high) in ranges.items()}
         yield fixed | drawn
@@ -285,9 +287,7 @@ def _check_names(key: str, names: Sequence[str], allowed: set[str]) -> None:
 def _check_jobs(config: DatasetConfig, result: Plan) -> None:
     jobs = result.jobs
     if not jobs:
-        raise InputError(
-            f"{config.name}: kind = {config.kind!r} leaves no sample to make; add [[shapes]] or [[sequences]]"
-        )
+        raise InputError(f"{config.name}: kind = {config.kind!r} leaves no sample to make; add [[sequences]]")
     seen: dict[str, Job] = {}
     for job in jobs:
         if job.id in seen:

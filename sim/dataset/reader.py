@@ -88,8 +88,8 @@ def write_dataset(
 ) -> Dataset:
     """Write samples that were made elsewhere (one scene, predictions) as a dataset of their own.
 
-    A sample's `labels["split"]`, if any, is its split. Raises InputError if the folder holds anything else, or a
-    sample of the same id.
+    A sample's `labels["split"]`, if any, is its split. Raises InputError if the folder holds anything else,
+    or a sample of the same id.
     """
     root = Path(path)
     made = list(samples)

@@ -1,12 +1,12 @@
 """The form of a dataset on disk.
 
-    ROOT/muslin.json               header: schema version, config, versions, solver digest, split of every sample
+    ROOT/muslin.json               header: schema version, config, versions, solver digest, splits
     ROOT/index.parquet             one row a sample; a cache of what the samples say, rebuilt when missing
     ROOT/samples/ID.zarr/          one zarr 3 group a sample
     ROOT/.partial/, ROOT/.lock     samples being written, and the lock of the process that writes
 
-Attributes of a group: `meta` (what is not an array, certificate included), `sha256` of every array's bytes (C order,
-little endian) and `meta_sha256` of the canonical JSON of `meta`. Arrays are compressed without loss.
+Attributes of a group: `meta` (what is not an array, certificate included), `sha256` of every array's bytes (C
+order, little endian) and `meta_sha256` of the canonical JSON of `meta`. Arrays are compressed without loss.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ LOCK = ".lock"
 SUFFIX = ".zarr"
 
 MASK_GAP_M = 2e-3
-"""A face of the body may be left out of contact only if it lies inside the body or within this distance of another
-part of its surface, metres."""
+"""A face of the body may be left out of contact only if it lies inside the body or within this distance of
+another part of its surface, metres."""
 
 CHUNK_BYTES = 1 << 20
-"""Frames are gathered in chunks of about this size, so that one frame can be read without the whole sequence."""
+"""Frames are gathered in chunks of about this size, so that one frame can be read without the whole
+sequence."""
 
 
 @dataclass(frozen=True)

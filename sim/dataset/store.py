@@ -83,8 +83,8 @@ def read_meta(root: Path, sample_id: str) -> tuple[dict[str, Any], dict[str, str
         raise InputError(f"{path}/zarr.json: not the attributes of a sample; {_REMEDY}")
     if meta.get("schema_version", 0) > SCHEMA_VERSION:
         raise InputError(
-            f"{path}: schema_version = {meta['schema_version']} is newer than {SCHEMA_VERSION}, the newest that "
-            "this program reads; update muslin (pip install -U muslin)"
+            f"{path}: schema_version = {meta['schema_version']} is newer than {SCHEMA_VERSION}, the newest "
+            "that this program reads; update muslin (pip install -U muslin)"
         )
     if attributes.get("meta_sha256") != digest(meta):
         raise InputError(f"{path}/zarr.json: attributes do not match their checksum; {_REMEDY}")

@@ -14,7 +14,7 @@ from muslin.sim.dataset.parts import Part
 def write_usd(path: Path, parts: Sequence[Part], fps: float | None) -> None:
     """Write parts under /sample, y up, metres; frame t at time code t. Raises InputError without usd-core."""
     try:
-        from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+        from pxr import Gf, Sdf, Tf, Usd, UsdGeom, Vt
     except ImportError as error:
         raise InputError("format usd needs the package usd-core; pip install 'muslin[usd]'") from error
     stage = Usd.Stage.CreateNew(str(path))
@@ -28,7 +28,7 @@ def write_usd(path: Path, parts: Sequence[Part], fps: float | None) -> None:
     root = UsdGeom.Xform.Define(stage, "/sample")
     stage.SetDefaultPrim(root.GetPrim())
     for part in parts:
-        mesh = UsdGeom.Mesh.Define(stage, f"/sample/{part.name}")
+        mesh = UsdGeom.Mesh.Define(stage, f"/sample/{Tf.MakeValidIdentifier(part.name)}")
         mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(part.faces), 3, dtype=np.int32)))
         mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(part.faces.ravel().astype(np.int32)))
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -30,7 +29,8 @@ FRAMES_A_TASK = 24
 
 @dataclass(frozen=True)
 class Verification:
-    """Sums over all samples that could be read; `failed`: {sample id: why}, in dataset order; empty if all is well.
+    """Sums over all samples that could be read; `failed`: {sample id: why}, in dataset order; empty if all is
+    well.
 
     missing: samples that the dataset plans but does not hold yet.
     """
@@ -89,12 +89,13 @@ def verify(
     workers: int | None = None,
     progress: Callable[[float, int, str], None] | None = None,
 ) -> Verification:
-    """Count intersections of every frame of every sample with ipctk, on the body computed again from its model.
+    """Count intersections of every frame of every sample with ipctk, on the body computed again from its
+    model.
 
-    A sample fails if it is damaged (sha256, shapes, NaN, a garment that is no manifold), if its body model is not the
-    one that it was made with, if any frame has an intersection, or if a body face was left out of contact that does
-    not lie inside the body (or within `MASK_GAP_M` of another part of it). Raises InputError if the folder is no
-    dataset.
+    A sample fails if it is damaged (sha256, shapes, NaN, a garment that is no manifold), if its body model is
+    not the one that it was made with, if any frame has an intersection, or if a body face was left out of
+    contact that does not lie inside the body (or within `MASK_GAP_M` of another part of it). Raises
+    InputError if the folder is no dataset.
     """
     root = Path(path)
     header = read_header(root)
@@ -136,7 +137,9 @@ def verify_sample(sample: Sample, start: int = 0, stop: int | None = None) -> Fi
         cloth_body += counts[1]
         if reason:
             reasons.append(f"frame {frame}: {reason}")
-    summary = reasons[0] + (f" (and {len(reasons) - 1} more frames)" if len(reasons) > 1 else "") if reasons else ""
+    summary = (
+        reasons[0] + (f" (and {len(reasons) - 1} more frames)" if len(reasons) > 1 else "") if reasons else ""
+    )
     return Finding(sample.id, len(frames), cloth_cloth, cloth_body, masked_max, summary)
 
 

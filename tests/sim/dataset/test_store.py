@@ -1,0 +1,182 @@
+"""What is written comes back bit for bit; what is damaged is refused by name."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sheet_producer import make_sample
+
+from muslin.garments.errors import InputError
+from muslin.sim.dataset import store
+from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.header import Header, digest, prepare_root
+from muslin.sim.dataset.sample import BodyTrack
+from muslin.sim.dataset.schema import ARRAYS, CHUNK_BYTES, PARTIAL, chunk_frames
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    folder = tmp_path / "data"
+    prepare_root(folder, Header(config={}, splits={"sheet": "train"}))
+    return folder
+
+
+def test_every_field_survives_the_round_trip_bit_for_bit(root: Path) -> None:
+    masked = tuple(np.arange(k, dtype=np.int32) for k in (3, 0, 5))
+    written = replace(
+        make_sample(frames=3),
+        masked_faces=masked,
+        seed=7,
+        labels={"design": "sheet", "shape": "mean"},
+        certificate=Certificate(0, 0, 1e-3, 5, 0.02, 0.1, 7, "abc", 1.5, {"numpy": "2"}, {"iterations": [1, 2]}),
+    )
+    assert store.write_sample(root, written)
+    read = store.read_sample(root, "sheet")
+    for entry in fields(written):
+        a, b = getattr(written, entry.name), getattr(read, entry.name)
+        if isinstance(a, np.ndarray):
+            assert a.dtype == b.dtype
+            assert a.tobytes() == b.tobytes()
+        elif entry.name == "garment":
+            for part in fields(a):
+                np.testing.assert_array_equal(getattr(a, part.name), getattr(b, part.name))
+        elif entry.name == "masked_faces":
+            assert [m.tolist() for m in a] == [m.tolist() for m in b]
+            assert all(m.dtype == np.int32 for m in b)
+        else:
+            assert a == b
+    np.testing.assert_array_equal(read.times, [0.0, 1 / 30, 2 / 30])
+
+
+def test_body_track_keeps_float64(root: Path) -> None:
+    draw = np.random.default_rng(0)
+    track = BodyTrack("female", "d", draw.normal(size=10), draw.normal(size=(1, 24, 3)), draw.normal(size=(1, 3)))
+    sample = replace(make_sample(), body=track, obstacle_vertices=None, obstacle_faces=None)
+    store.write_sample(root, sample)
+    read = store.read_sample(root, "sheet").body
+    assert read is not None
+    for name in ("beta", "poses", "translations"):
+        assert getattr(read, name).tobytes() == getattr(track, name).tobytes()
+
+
+def test_masks_that_are_all_empty_stay_empty(root: Path) -> None:
+    none = tuple(np.zeros(0, dtype=np.int32) for _ in range(2))
+    store.write_sample(root, replace(make_sample(frames=2), masked_faces=none))
+    assert [len(m) for m in store.read_sample(root, "sheet").masked_faces] == [0, 0]
+
+
+def test_a_long_sequence_is_one_shard_of_many_chunks(root: Path) -> None:
+    sample = make_sample(frames=1500)
+    assert chunk_frames(sample.positions.shape, 4) == CHUNK_BYTES // (81 * 12)
+    store.write_sample(root, sample)
+    folder = store.sample_path(root, "sheet") / "positions"
+    assert [p.name for p in folder.rglob("*") if p.is_file() and p.name != "zarr.json"] == ["0"]
+    np.testing.assert_array_equal(store.read_array(root, "sheet", "positions"), sample.positions)
+
+
+def test_the_first_commit_wins(root: Path) -> None:
+    first = make_sample()
+    assert store.write_sample(root, first)
+    assert not store.write_sample(root, make_sample(clearance=0.5))
+    np.testing.assert_array_equal(store.read_sample(root, "sheet").positions, first.positions)
+    assert not list((root / PARTIAL).iterdir())
+
+
+def test_partial_samples_are_not_samples_and_are_cleaned(root: Path) -> None:
+    half = root / PARTIAL / "sheet-123.zarr"
+    half.mkdir()
+    (half / "zarr.json").write_text("{")
+    assert store.stored_ids(root) == []
+    store.clean_partial(root)
+    assert not half.exists()
+
+
+@pytest.mark.parametrize("name", ["positions", "faces", "panel_vertices", "obstacle_vertices"])
+@pytest.mark.parametrize("damage", ["flip", "truncate", "remove"])
+def test_a_damaged_chunk_is_named_with_a_remedy(root: Path, name: str, damage: str) -> None:
+    store.write_sample(root, make_sample(frames=2))
+    folder = store.sample_path(root, "sheet") / name
+    chunk = next(p for p in folder.rglob("*") if p.is_file() and p.name != "zarr.json")
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 0x10
+    match damage:
+        case "flip":
+            chunk.write_bytes(data)
+        case "truncate":
+            chunk.write_bytes(data[: len(data) // 2])
+        case "remove":
+            chunk.unlink()
+    with pytest.raises(InputError, match=rf"sheet\.zarr/{name}: .*generate.*again"):
+        store.read_sample(root, "sheet")
+
+
+def test_damaged_attributes_are_refused(root: Path) -> None:
+    store.write_sample(root, make_sample())
+    file = store.sample_path(root, "sheet") / "zarr.json"
+    whole = file.read_text()
+    file.write_text(whole.replace('"paper"', '"denim"'))
+    with pytest.raises(InputError, match="do not match their checksum"):
+        store.read_sample(root, "sheet")
+    file.write_text(whole[:200])
+    with pytest.raises(InputError, match=r"zarr\.json: not readable"):
+        store.read_sample(root, "sheet")
+    file.unlink()
+    with pytest.raises(InputError, match=r"zarr\.json: not readable"):
+        store.read_sample(root, "sheet")
+
+
+def test_a_sample_of_a_newer_schema_is_refused(root: Path) -> None:
+    store.write_sample(root, make_sample())
+    file = store.sample_path(root, "sheet") / "zarr.json"
+    values = json.loads(file.read_text())
+    values["attributes"]["meta"]["schema_version"] = 2
+    values["attributes"]["meta_sha256"] = digest(values["attributes"]["meta"])
+    file.write_text(json.dumps(values))
+    with pytest.raises(InputError, match="newer than 1.*update muslin"):
+        store.read_sample(root, "sheet")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_cannot_be_is_never_written(root: Path, value: float) -> None:
+    sample = make_sample()
+    positions = sample.positions.copy()
+    positions[0, 4, 1] = value
+    with pytest.raises(InputError, match="sheet: NaN or infinity in positions"):
+        store.write_sample(root, replace(sample, positions=positions))
+    assert store.stored_ids(root) == []
+    assert not list((root / PARTIAL).iterdir())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"id": "../up"}, "letters, digits"),
+        ({"id": ""}, "letters, digits"),
+        ({"kind": "video"}, "'drape' or 'sequence'"),
+        ({"kind": "sequence"}, "fps = None"),
+        ({"positions": np.zeros((1, 80, 3), np.float32)}, r"positions of shape \(1, 80, 3\)"),
+        ({"positions": np.zeros((1, 81, 3))}, "float64.*float32"),
+        ({"positions": np.zeros((0, 81, 3), np.float32)}, "0 frames"),
+        ({"masked_faces": (np.zeros(1, np.int32),) * 2}, "2 frames of masked_faces"),
+        ({"obstacle_faces": None}, "given together"),
+        ({"obstacle_faces": np.full((1, 3), 10_000, np.int32)}, "an index in obstacle_faces"),
+        ({"certificate": Certificate(min_distance_m=float("nan"))}, "min_distance_m = nan"),
+    ],
+)
+def test_validation_names_what_is_wrong(root: Path, change: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        store.write_sample(root, replace(make_sample(), **change))
+    assert store.stored_ids(root) == []
+
+
+def test_certificates_keep_keys_of_other_versions() -> None:
+    values = Certificate(seed=3).to_dict() | {"colour": "red"}
+    assert Certificate.from_dict(values).extra == {"colour": "red"}
+
+
+def test_every_array_of_the_schema_is_documented() -> None:
+    assert all(spec.meaning and np.dtype(spec.dtype) for spec in ARRAYS.values())
