@@ -33,14 +33,14 @@ NECK_HALF_WIDTH = 0.0975
 BACK_NECK_DROP = 0.022
 SHOULDER_SLOPE = math.radians(20.0)
 BASE_CHEST = 1.04  # chest circumference at which the lengths below hold
-SHOULDER_LENGTH, SHOULDER_GRADE = 0.130, 0.08  # at the base chest; growth per metre of chest
-ARMHOLE_DEPTH, ARMHOLE_GRADE = 0.235, 0.10
+SHOULDER_LENGTH, SHOULDER_GRADE = 0.130, 0.12  # at the base chest; growth per metre of chest
+ARMHOLE_DEPTH, ARMHOLE_GRADE = 0.235, 0.08
 FRONT_SCOOP, BACK_SCOOP = 0.62, 0.50  # how far the armhole follows the shoulder's normal, share of its height
-CAP_HEIGHT = 0.095  # of a long sleeve; a sleeve for an arm raised some 30 degrees
+CAP_HEIGHT, CAP_GRADE = 0.110, 0.15  # of a long sleeve, for an arm raised some 35 degrees
 LEAST_UNDERARM = 0.03  # underarm seam that the shortest sleeve keeps
-SLEEVE_TAPER = 0.135  # narrowing of the half sleeve per metre of underarm length
+SLEEVE_TAPER = 0.8  # share of its half width that the sleeve loses per metre of underarm length
 HIP_CIRCUMFERENCE, HIP_DROP = 1.09, 0.60  # to be cleared; height of the hips below HPS
-SKIRT_FLARE = 0.16
+SKIRT_FLARE = 0.13
 SKIRT_START, SKIRT_FULL = 0.65, 1.05  # garment lengths between which the flare comes in
 
 PARAMETERS = {
@@ -48,8 +48,8 @@ PARAMETERS = {
     for parameter in (
         Parameter("sleeve_length", 0.10, 0.62, 0.22, "m", "shoulder tip to cuff along the top of the sleeve"),
         Parameter("chest_circumference", 0.90, 1.30, 1.04, "m", "around the whole garment under the arms"),
-        Parameter("garment_length", 0.45, 1.30, 0.64, "m", "high point of the shoulder to hem"),
-        Parameter("neckline_depth", 0.06, 0.18, 0.09, "m", "high point of the shoulder to front neckline"),
+        Parameter("garment_length", 0.48, 1.30, 0.64, "m", "high point of the shoulder to hem"),
+        Parameter("neckline_depth", 0.06, 0.16, 0.09, "m", "high point of the shoulder to front neckline"),
     )
 }
 
@@ -84,7 +84,7 @@ PRESETS = {
 REFERENCE = {
     "sleeve_length": 0.28,
     "chest_circumference": 1.08,
-    "garment_length": 0.80,
+    "garment_length": 0.76,
     "neckline_depth": 0.10,
 }
 
@@ -175,7 +175,7 @@ def _hem(underarm: Point, slope: float, length: float) -> tuple[Point, CubicBezi
 
 def _cap_height(sleeve_length: float, chest: float) -> float:
     """Height of the sleeve cap, smooth in the sleeve length and always shorter than it, metres."""
-    full = CAP_HEIGHT * armhole_depth(chest) / ARMHOLE_DEPTH
+    full = CAP_HEIGHT + CAP_GRADE * (chest - BASE_CHEST)
     return full * math.tanh((sleeve_length - LEAST_UNDERARM) / full)
 
 
@@ -196,7 +196,7 @@ def _sleeve(
 ) -> Panel:
     """Sleeve whose half at x > 0 is `positive` (side, half width), at x < 0 `negative`."""
     (right, w_right), (left, w_left) = positive, negative
-    narrowing = SLEEVE_TAPER * (length - height)
+    narrowing = SLEEVE_TAPER * 0.5 * (w_right + w_left) * (length - height)
     cuff_right, cuff_left = (w_right - narrowing, -length), (-(w_left - narrowing), -length)
     cap_right, cap_left = _cap(w_right, height), _cap(w_left, height).mirrored()
     return Panel(
