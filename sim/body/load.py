@@ -38,8 +38,8 @@ def load_body(name_or_path: str | Path) -> BodyModel:
     path = Path(name_or_path)
     if path.suffix.lower() not in READERS:
         raise InputError(
-            f"body '{name_or_path}' is unknown; allowed are {', '.join(BODY_NAMES)}, or the path of an SMPL file "
-            f"ending in {' or '.join(READERS)}"
+            f"body '{name_or_path}' is unknown; allowed are {', '.join(BODY_NAMES)}, or the path of an SMPL "
+            f"file ending in {' or '.join(READERS)}"
         )
     if not path.is_file():
         raise InputError(f"body file {path} does not exist; give the path of an SMPL .npz or .pkl file")
@@ -107,8 +107,8 @@ def _parents(kintree_table: Any, source: str) -> NDArray[np.int32]:
     table = np.asarray(kintree_table)
     if table.shape != (2, NUM_JOINTS):
         raise InputError(
-            f"{source}: kintree_table has shape {table.shape}; this program reads SMPL bodies with {NUM_JOINTS} "
-            "joints, (2, 24); SMPL-H and SMPL-X files have more and are not read"
+            f"{source}: kintree_table has shape {table.shape}; allowed is (2, {NUM_JOINTS}), an SMPL body; "
+            "SMPL-H and SMPL-X files have more joints and are not read"
         )
     parents = table[0].astype(np.int64)
     # SMPL's files mark the root by 2^32 - 1, which is -1 in 32 bits.

@@ -16,7 +16,7 @@ from muslin.sim.body.rotation import rotation_matrices
 
 Floats = NDArray[np.float64]
 
-# Frames skinned together: larger blocks only fall out of the cache.
+# Frames whose pose blend shapes are summed in one matrix product.
 FRAMES_PER_BLOCK = 16
 
 
@@ -101,13 +101,13 @@ class BodyModel:
         return result
 
     def joints(
-        self, beta: ArrayLike | None, theta: ArrayLike | None = None, translation: ArrayLike = 0.0
+        self, beta: ArrayLike | None = None, theta: ArrayLike | None = None, translation: ArrayLike = 0.0
     ) -> Floats:
         """Positions of the posed joints, (..., 24, 3), metres."""
         return self._posed_joints(beta, _theta_or_rest(theta), translation)[2]
 
     def vertices(
-        self, beta: ArrayLike | None, theta: ArrayLike | None = None, translation: ArrayLike = 0.0
+        self, beta: ArrayLike | None = None, theta: ArrayLike | None = None, translation: ArrayLike = 0.0
     ) -> Floats:
         """The posed body.
 
@@ -135,11 +135,12 @@ class BodyModel:
         result = np.empty((len(theta), self.num_vertices, 3))
         for start in range(0, len(theta), FRAMES_PER_BLOCK):
             block = slice(start, start + FRAMES_PER_BLOCK)
-            shaped = (rest if rest.ndim == 2 else rest[block]) + self.pose_offsets(theta[block])
-            result[block] = self._skinned(shaped, transforms[block])
+            for frame, offsets in enumerate(self.pose_offsets(theta[block]), start):
+                shaped = rest if rest.ndim == 2 else rest[frame]
+                result[frame] = self._skinned(shaped + offsets, transforms[frame])
         return result.reshape(*batch, self.num_vertices, 3)
 
-    def ground_offset(self, beta: ArrayLike | None, theta: ArrayLike | None = None) -> Floats:
+    def ground_offset(self, beta: ArrayLike | None = None, theta: ArrayLike | None = None) -> Floats:
         """Translation along y, metres, (...,), that puts the lowest vertex on the ground y = 0."""
         return -self.vertices(beta, theta)[..., 1].min(axis=-1)
 
@@ -156,11 +157,9 @@ class BodyModel:
         return sparse.csr_array(self.weights)
 
     def _skinned(self, points: Floats, transforms: Floats) -> Floats:
-        frames = len(transforms)
-        flat = transforms[:, :, :3, :].transpose(1, 0, 2, 3).reshape(NUM_JOINTS, frames * 12)
-        blended = (self._weight_operator @ flat).reshape(self.num_vertices, frames, 3, 4)
-        turned = np.einsum("vfij,fvj->fvi", blended[..., :3], points)
-        return turned + blended[..., 3].transpose(1, 0, 2)
+        """sum_j w_j G_j [p; 1] of one frame: points (V, 3), transforms (24, 4, 4)."""
+        blended = (self._weight_operator @ transforms[:, :3].reshape(NUM_JOINTS, 12)).reshape(-1, 3, 4)
+        return np.einsum("vij,vj->vi", blended[..., :3], points) + blended[..., 3]
 
     def _posed_joints(
         self, beta: ArrayLike | None, theta: ArrayLike, translation: ArrayLike

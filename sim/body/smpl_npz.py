@@ -26,8 +26,8 @@ BODY_KEYS = (
 def read_npz(path: Path) -> dict[str, Any]:
     """Arrays of an .npz file by key.
 
-    A member of dtype object (SMPL files converted together with their scipy regressor have one) is a pickle and
-    goes through the same allow-list as a .pkl file.
+    A member of dtype object (SMPL files converted together with their scipy regressor have one) is a pickle
+    and goes through the same allow-list as a .pkl file.
 
     Raises:
         InputError: no .npz file, damaged, or with a forbidden pickle.

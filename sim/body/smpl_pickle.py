@@ -17,6 +17,10 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 
+# What unpickling a damaged file can raise.
+DAMAGE = (pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError, LookupError, OverflowError,
+          MemoryError, RecursionError)  # fmt: skip
+
 
 class _Dtype:
     """Stands for numpy.dtype: numbers, booleans, bytes, text and object references only."""
@@ -31,8 +35,8 @@ class _Dtype:
         self.order = _text(state[1])
 
     def resolve(self) -> np.dtype[Any]:
-        order = self.order if self.order in ("<", ">") else "="
-        return np.dtype(self.code).newbyteorder(order)
+        dtype = np.dtype(self.code)
+        return dtype.newbyteorder(">") if self.order == ">" else dtype
 
 
 class _Array:
@@ -181,8 +185,8 @@ class _ArrayUnpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         if (module, name) not in _ALLOWED:
             raise InputError(
-                f"{self._label}: the pickle asks for {module}.{name}, which no SMPL file needs; refused, nothing "
-                "was run; get the file from its original source"
+                f"{self._label}: the pickle asks for {module}.{name}, which no SMPL file needs; refused, "
+                "nothing was run; get the file from its original source"
             )
         stand_in = _ALLOWED[module, name]
         return _Type(stand_in) if isinstance(stand_in, type) else stand_in
@@ -204,8 +208,7 @@ def unpickle_arrays(stream: IO[bytes], label: str) -> Any:
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(label) else f"{label}: {message}") from error
-    except (pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError, LookupError, OverflowError,
-            MemoryError, RecursionError, UnicodeError) as error:  # fmt: skip
+    except DAMAGE as error:
         raise InputError(
             f"{label}: no readable SMPL pickle ({type(error).__name__}: {error}); give an intact file"
         ) from error

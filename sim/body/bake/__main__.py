@@ -42,9 +42,9 @@ def bake(gender: str, path: Path, *, with_pose_shapes: bool) -> None:
     posedirs = np.zeros((*space.v_template.shape, NUM_POSE_FEATURES))
     if with_pose_shapes:
         model = BodyModel(
-            name=gender, v_template=space.v_template, shapedirs=space.shapedirs, posedirs=posedirs, weights=weights,
-            parents=np.array(PARENTS, dtype=np.int32), faces=samples.faces, joint_template=space.joint_template,
-            joint_shapedirs=space.joint_shapedirs, source=SOURCE,
+            name=gender, v_template=space.v_template, shapedirs=space.shapedirs, posedirs=posedirs,
+            weights=weights, parents=np.array(PARENTS, dtype=np.int32), faces=samples.faces,
+            joint_template=space.joint_template, joint_shapedirs=space.joint_shapedirs, source=SOURCE,
         )  # fmt: skip
         poses = sample_poses(NUM_POSES + NUM_HELD_OUT, seed=0)
         offsets = pose_targets(model, poses)
@@ -58,9 +58,8 @@ def bake(gender: str, path: Path, *, with_pose_shapes: bool) -> None:
         joint_template=space.joint_template, joint_shapedirs=space.joint_shapedirs, joint_regressor=regressor,
         weights=weights, faces=samples.faces, source=SOURCE,
     )  # fmt: skip
-    print(
-        f"{gender}: {path} {path.stat().st_size / 1e6:.2f} MB, volume {volume(space.v_template, samples.faces):.4f} m3"
-    )
+    litres = 1e3 * volume(space.v_template, samples.faces)
+    print(f"{gender}: {path} {path.stat().st_size / 1e6:.2f} MB, volume {litres:.1f} l")
 
 
 def main() -> None:

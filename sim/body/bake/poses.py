@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from muslin.sim.body.joints import JOINT, NUM_JOINTS
 
-# Degrees about x, y, z of the T-pose's axes for the left side: (low, high, mean, standard deviation). The right
-# side is its mirror image (y and z change sign). Ranges follow clinical ranges of motion; means and deviations
-# are those of everyday movement, in which arms hang and hips and knees flex.
+# Degrees about x, y, z of the T-pose's axes for the left side: (low, high, mean, standard deviation). The
+# right side is its mirror image (y and z change sign). Limits follow clinical ranges of motion; means and
+# deviations are those of everyday movement, in which arms hang and hips and knees flex.
 _LIMITS = {
     "hip": ((-120, 25, -20, 30), (-40, 40, 0, 12), (-20, 45, 5, 10)),
     "knee": ((0, 140, 30, 30), (-10, 10, 0, 4), (-5, 5, 0, 2)),
