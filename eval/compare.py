@@ -1,0 +1,277 @@
+"""Score anything against anything: predictions against simulations, coarse against fine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from muslin.eval.meshes import check_mesh
+from muslin.eval.metrics.accumulate import ErrorAccumulator, PenetrationAccumulator
+from muslin.eval.metrics.hausdorff import hausdorff
+from muslin.eval.metrics.penetration import Penetration, is_closed, signed_distances
+from muslin.eval.metrics.surface_sampling import surface_distance
+from muslin.eval.metrics.velocity import velocity_errors
+from muslin.eval.metrics.vertex import Statistics, vertex_areas, vertex_errors
+from muslin.eval.subjects import Track, matched, open_subject
+from muslin.garments.errors import InputError
+from muslin.sim.dataset.sample import Sample
+
+MM = 1000.0
+SURFACE_FRAMES = 24
+
+Progress = Callable[[float, int, str], None]
+
+
+@dataclass(frozen=True)
+class FrameScores:
+    """Figures of one pair frame by frame, millimetres; None where a figure does not exist.
+
+    surface_frames    the frames that `hausdorff` and `surface` belong to
+    """
+
+    vertex_mean: list[float] | None
+    vertex_max: list[float] | None
+    velocity_mean: list[float] | None
+    penetration_ratio: list[float] | None
+    surface_frames: list[int]
+    hausdorff: list[float]
+    surface: list[float]
+
+
+@dataclass(frozen=True)
+class PairScore:
+    """All figures of one prediction against one truth; JSON values, millimetres."""
+
+    prediction: str
+    truth: str
+    labels: dict[str, str]
+    beta: list[float]
+    fps: float | None
+    num_frames: int
+    figures: dict[str, Any]
+    frames: FrameScores
+
+
+@dataclass
+class Totals:
+    """What the pairs add up to."""
+
+    vertex: ErrorAccumulator = field(default_factory=ErrorAccumulator)
+    velocity: ErrorAccumulator = field(default_factory=ErrorAccumulator)
+    predicted: PenetrationAccumulator = field(default_factory=PenetrationAccumulator)
+    true: PenetrationAccumulator = field(default_factory=PenetrationAccumulator)
+    hausdorff_lower: list[float] = field(default_factory=list)
+    hausdorff_upper: list[float] = field(default_factory=list)
+    surface_mean: list[float] = field(default_factory=list)
+    surface_rms: list[float] = field(default_factory=list)
+
+    def merge(self, other: Totals) -> None:
+        self.vertex.errors += other.vertex.errors
+        self.vertex.weights += other.vertex.weights
+        self.velocity.errors += other.velocity.errors
+        self.velocity.weights += other.velocity.weights
+        self.predicted.distances += other.predicted.distances
+        self.true.distances += other.true.distances
+        for name in ("hausdorff_lower", "hausdorff_upper", "surface_mean", "surface_rms"):
+            getattr(self, name).extend(getattr(other, name))
+
+    def figures(self) -> dict[str, Any]:
+        """JSON values; a figure that does not exist is None."""
+        return {
+            "vertex_error_mm": _scaled(self.vertex.result()),
+            "vertex_error_area_weighted_mm": _scaled(self.vertex.weighted_result()),
+            "velocity_error_mm_s": _scaled(self.velocity.result()),
+            "hausdorff_mm": MM * max(self.hausdorff_lower),
+            "hausdorff_upper_mm": MM * max(self.hausdorff_upper),
+            "hausdorff_mean_mm": MM * float(np.mean(self.hausdorff_lower)),
+            "mean_surface_distance_mm": MM * float(np.mean(self.surface_mean)),
+            "rms_surface_distance_mm": MM * float(np.sqrt(np.mean(np.square(self.surface_rms)))),
+            "penetration": _penetration(self.predicted.result()),
+            "truth_penetration": _penetration(self.true.result()),
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Figures over all pairs, each pair's own, and what could not be compared."""
+
+    prediction: str
+    truth: str
+    frames: int
+    figures: dict[str, Any]
+    pairs: list[PairScore]
+    unmatched_prediction: list[str]
+    unmatched_truth: list[str]
+    notes: list[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "prediction": self.prediction,
+            "truth": self.truth,
+            "samples": len(self.pairs),
+            "frames": self.frames,
+            **self.figures,
+            "notes": self.notes,
+            "unmatched": {"prediction": self.unmatched_prediction, "truth": self.unmatched_truth},
+            "pairs": [asdict(pair) for pair in self.pairs],
+        }
+
+    def to_json(self) -> str:
+        return json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
+
+
+def compare(
+    prediction: str | Path,
+    truth: str | Path,
+    *,
+    fps: float | None = None,
+    surface_frames: int = SURFACE_FRAMES,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Compare two datasets, samples, mesh files or folders of meshes.
+
+    Vertex and velocity errors exist where both sides have the same faces, surface distances always,
+    penetration where the truth has a closed body: both sides are measured against the truth's body.
+
+    fps              frames per second of folders of meshes; None leaves velocity errors out
+    surface_frames   most frames of a sequence that get surface distances, evenly spread (they cost most)
+
+    Raises InputError for missing, empty, non-manifold or non-finite meshes, for datasets with nothing in
+    common, and for sequences of different length or rate.
+    """
+    if surface_frames < 1:
+        raise InputError(f"surface_frames = {surface_frames}: must be 1 or more")
+    first, second = open_subject(prediction, fps), open_subject(truth, fps)
+    pairs, left_first, left_second = matched(first, second)
+    totals, frames = Totals(), 0
+    notes: list[str] = []
+    scores: list[PairScore] = []
+    for done, (a, b) in enumerate(pairs):
+        if progress is not None:
+            progress(done, len(pairs), b)
+        score, part, remarks = _score(first.load(a), second.load(b), surface_frames)
+        totals.merge(part)
+        scores.append(score)
+        notes += [remark for remark in remarks if remark not in notes]
+        frames += score.num_frames
+    if progress is not None:
+        progress(len(pairs), len(pairs), "")
+    return Comparison(
+        prediction=str(prediction),
+        truth=str(truth),
+        frames=frames,
+        figures=totals.figures(),
+        pairs=scores,
+        unmatched_prediction=left_first,
+        unmatched_truth=left_second,
+        notes=notes,
+    )
+
+
+def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairScore, Totals, list[str]]:
+    for track in (prediction, truth):
+        check_mesh(track.positions, track.faces, track.name)
+    T = len(truth.positions)
+    if len(prediction.positions) != T:
+        raise InputError(
+            f"{prediction.name} has {len(prediction.positions)} frames and {truth.name} has {T}; "
+            "give sequences of one length"
+        )
+    if T > 1 and prediction.fps != truth.fps:
+        raise InputError(
+            f"{prediction.name} has {prediction.fps} frames per second and {truth.name} has {truth.fps}; "
+            "resample one of them"
+        )
+    totals = Totals()
+    notes: list[str] = []
+    _score_vertices(prediction, truth, totals, notes)
+    chosen = np.unique(np.linspace(0, T - 1, min(T, surface_frames)).round().astype(int))
+    if len(chosen) < T:
+        notes.append(f"surface distances of {len(chosen)} of {T} frames of a sequence, evenly spread")
+    for t in chosen:
+        pair = (prediction.positions[t], prediction.faces, truth.positions[t], truth.faces)
+        bounds, distance = hausdorff(*pair), surface_distance(*pair)
+        totals.hausdorff_lower.append(bounds.lower)
+        totals.hausdorff_upper.append(bounds.upper)
+        totals.surface_mean.append(distance.mean)
+        totals.surface_rms.append(distance.rms)
+    _score_penetration(prediction, truth, totals, notes)
+    return _pair(prediction, truth, totals, chosen), totals, notes
+
+
+def _score_vertices(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
+    if prediction.positions.shape != truth.positions.shape or not np.array_equal(
+        prediction.faces, truth.faces
+    ):
+        notes.append("vertex and velocity errors are null: the meshes differ in topology")
+        return
+    for x, y in zip(prediction.positions, truth.positions, strict=True):
+        totals.vertex.update(vertex_errors(x, y), vertex_areas(y, truth.faces))
+    if len(truth.positions) < 2:
+        notes.append("velocity errors are null: one frame only")
+    elif truth.fps is None:
+        notes.append("velocity errors are null: the frame rate is not known; give it (--fps)")
+    else:
+        for errors in velocity_errors(prediction.positions, truth.positions, truth.fps):
+            totals.velocity.update(errors)
+
+
+def _score_penetration(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
+    sample = truth.sample
+    if sample is None or not len(sample.body_faces):
+        notes.append("penetration is null: the truth has no body")
+    elif not is_closed(sample.body_faces):
+        notes.append("penetration is null: the truth's body or obstacle is not closed")
+    else:
+        for t in range(len(truth.positions)):
+            body = sample.body_vertices(t)
+            totals.predicted.update(signed_distances(prediction.positions[t], body, sample.body_faces))
+            totals.true.update(signed_distances(truth.positions[t], body, sample.body_faces))
+
+
+def _pair(prediction: Track, truth: Track, totals: Totals, chosen: np.ndarray) -> PairScore:
+    vertex, velocity = totals.vertex.errors, totals.velocity.errors
+    inside = totals.predicted.distances
+    frames = FrameScores(
+        vertex_mean=[MM * float(e.mean()) for e in vertex] or None,
+        vertex_max=[MM * float(e.max()) for e in vertex] or None,
+        velocity_mean=[MM * float(e.mean()) for e in velocity] or None,
+        penetration_ratio=[float((d < 0).mean()) for d in inside] or None,
+        surface_frames=chosen.tolist(),
+        hausdorff=[MM * value for value in totals.hausdorff_lower],
+        surface=[MM * value for value in totals.surface_mean],
+    )
+    sample = truth.sample
+    return PairScore(
+        prediction=prediction.name,
+        truth=truth.name,
+        labels=_labels(sample),
+        beta=[] if sample is None or sample.body is None else sample.body.beta.tolist(),
+        fps=truth.fps,
+        num_frames=len(truth.positions),
+        figures=totals.figures(),
+        frames=frames,
+    )
+
+
+def _labels(sample: Sample | None) -> dict[str, str]:
+    return {} if sample is None else {"kind": sample.kind, "fabric": sample.fabric, **sample.labels}
+
+
+def _scaled(statistics: Statistics | None) -> dict[str, float] | None:
+    return None if statistics is None else statistics.scaled(MM)
+
+
+def _penetration(found: Penetration | None) -> dict[str, float] | None:
+    if found is None:
+        return None
+    return {
+        "ratio": found.ratio,
+        "depth_mean_mm": MM * found.depth_mean,
+        "depth_max_mm": MM * found.depth_max,
+    }
