@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,9 @@ from muslin.sim.body.smpl_pickle import unpickle_arrays
 
 _HEADER_READERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
-# What a body is made of; other members of the archive stay unread.
-BODY_KEYS = (
-    "v_template", "shapedirs", "shapedirs_scale", "posedirs", "posedirs_scale", "weights", "weights_scale",
-    "J_regressor", "joint_template", "joint_shapedirs", "kintree_table", "f", "source",
-)  # fmt: skip
 
-
-def read_npz(path: Path) -> dict[str, Any]:
-    """Arrays of an .npz file by key.
+def read_npz(path: Path, keys: Collection[str]) -> dict[str, Any]:
+    """The named arrays of an .npz file; its other members stay unread.
 
     A member of dtype object (SMPL files converted together with their scipy regressor have one) is a pickle
     and goes through the same allow-list as a .pkl file.
@@ -37,9 +32,9 @@ def read_npz(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as archive:
             for member in archive.namelist():
                 key = member.removesuffix(".npy")
-                if key in BODY_KEYS:
+                if key in keys:
                     arrays[key] = _read_member(archive.read(member), f"{path}, {key}")
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError, RuntimeError) as error:
         raise InputError(
             f"{path}: no readable .npz archive ({error}); give an intact SMPL .npz file"
         ) from error
