@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib
 import multiprocessing
 import os
 import queue
-import threading
 import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection
-from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, Protocol
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.config import DatasetConfig
-from muslin.sim.dataset.header import Header, canonical, digest, prepare_root
+from muslin.sim.dataset.header import Header, prepare_root
 from muslin.sim.dataset.index import write_index
-from muslin.sim.dataset.plan import Chain, Job, Plan, plan
-from muslin.sim.dataset.sample import Sample
+from muslin.sim.dataset.jobs import Plan
+from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.schema import LOCK
-
-FrameProgress = Callable[[int, int], None]
-"""(work done, work in all) of one chain."""
-
-ChainSimulator = Callable[[list[Any], str, FrameProgress | None], Iterator[Sample]]
-"""(scenes of a chain, device, progress) -> the samples in order. Must be importable by name in another
-process."""
+from muslin.sim.dataset.solver import solver_digest
+from muslin.sim.dataset.worker import ChainSimulator, Task, make_chain, start_worker
 
 
 class Progress(Protocol):
@@ -52,20 +41,6 @@ class GenerateReport:
     kept: tuple[str, ...]
     failed: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What one process needs to make the missing samples of a chain."""
-
-    place: int
-    root: Path
-    chain: Chain
-    scenes: list[Any]
-    missing: frozenset[str]
-    versions: dict[str, str]
-    device: str
-    simulate: ChainSimulator | None
 
 
 def generate(
@@ -110,7 +85,7 @@ def generate(
         header.write(root)
         store.clean_partial(root)
         todo = [
-            _Task(k, root, chain, chain_scenes, missing, header.versions, device, simulate)
+            Task(k, root, chain, chain_scenes, missing, header.versions, device, simulate)
             for k, (chain, chain_scenes) in enumerate(zip(planned.chains, scenes, strict=True))
             if any(job.id in missing for job in chain.jobs)
         ]
@@ -120,30 +95,6 @@ def generate(
     made = tuple(job.id for job in planned.jobs if job.id in missing and job.id not in failed)
     kept = tuple(job.id for job in planned.jobs if job.id in there)
     return GenerateReport(made, kept, failed, time.perf_counter() - started)
-
-
-def solver_digest(simulate: ChainSimulator | None = None) -> str:
-    """sha256 over the sources and data that decide the geometry: `muslin.garments` and `muslin.sim` (without
-    `dataset`, `view` and the tools that bake assets), or the module of another simulator; with the versions
-    installed.
-    """
-    total = hashlib.sha256(canonical(Header(config={}, splits={}).versions))
-    if simulate is not None:
-        total.update(f"{simulate.__module__}.{simulate.__qualname__}".encode())
-        return total.hexdigest()
-    for package in ("muslin.garments", "muslin.sim"):
-        folder = Path(importlib.import_module(package).__path__[0])
-        for file in sorted(p for p in folder.rglob("*") if p.suffix in _SOURCES):
-            inner = file.relative_to(folder)
-            if not _ASIDE.isdisjoint(inner.parts):
-                continue
-            total.update(inner.as_posix().encode())
-            total.update(hashlib.sha256(file.read_bytes()).digest())
-    return total.hexdigest()
-
-
-_SOURCES = {".py", ".toml", ".npz", ".json"}
-_ASIDE = {"dataset", "view", "bake", "retarget", "__pycache__"}
 
 
 def _check_solver(root: Path, before: Header | None, header: Header, missing: bool, there: bool) -> None:
@@ -184,7 +135,7 @@ def _silent(done: float, total: int, message: str) -> None:
     pass
 
 
-def _run(todo: Sequence[_Task], workers: int | None, device: str, progress: Progress) -> dict[str, str]:
+def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progress) -> dict[str, str]:
     """Run the chains over processes; return {id: reason} of the samples that could not be made."""
     usable = len(os.sched_getaffinity(0)) if device == "cpu" else 1
     count = min(workers or usable, len(todo))
@@ -201,12 +152,12 @@ def _run(todo: Sequence[_Task], workers: int | None, device: str, progress: Prog
     failed: dict[str, str] = {}
     with _one_thread_each():
         pool = ProcessPoolExecutor(
-            count, mp_context=context, initializer=_start_worker, initargs=(news, leash)
+            count, mp_context=context, initializer=start_worker, initargs=(news, leash)
         )
         try:
             # Sequences first: a long one begun last would leave the other cores idle.
             order = sorted(todo, key=lambda task: task.chain.jobs[0].kind != "sequence")
-            pending: set[Future[dict[str, str]]] = {pool.submit(_make_chain, task) for task in order}
+            pending: set[Future[dict[str, str]]] = {pool.submit(make_chain, task) for task in order}
             while pending:
                 finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
                 for future in finished:
@@ -257,72 +208,3 @@ def _one_thread_each() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-_news: Any = None
-
-
-def _start_worker(news: Any, leash: Connection) -> None:
-    global _news
-    _news = news
-    # What the queue still holds must not keep a worker from ending when nobody reads it any more.
-    news.cancel_join_thread()
-    threading.Thread(target=_end_with_parent, args=(leash,), daemon=True).start()
-
-
-def _end_with_parent(leash: Connection) -> None:
-    """End this process as soon as the other end of the leash is closed: by the parent, or by its death."""
-    wait_for([leash])
-    os._exit(1)
-
-
-def _make_chain(task: _Task) -> dict[str, str]:
-    """Make the missing samples of a chain; return {id: reason} of those that could not be made."""
-    simulate = task.simulate
-    if simulate is None:
-        from muslin.sim.run import simulate_chain
-
-        simulate = simulate_chain
-
-    def tell(done: int, total: int) -> None:
-        _news.put((task.place, done / max(1, total), task.chain.jobs[0].id))
-
-    left = [job for job in task.chain.jobs if job.id in task.missing]
-    started = time.perf_counter()
-    try:
-        samples = simulate(task.scenes, task.device, tell)
-        for job, sample in zip(task.chain.jobs, samples, strict=True):
-            seconds = time.perf_counter() - started
-            if job.id in task.missing:
-                store.write_sample(task.root, _named(job, sample, task, seconds))
-                left.remove(job)
-            if not left:
-                break
-            started = time.perf_counter()
-    except Exception as error:  # reported for the samples it cost; the other chains are not its business
-        reason = f"{type(error).__name__}: {error}"
-        if not isinstance(error, InputError) and type(error).__name__ != "SimulationError":
-            reason += "\n" + traceback.format_exc()
-        return {job.id: reason for job in left}
-    _news.put((task.place, 1.0, task.chain.jobs[0].id))
-    return {}
-
-
-def _named(job: Job, sample: Sample, task: _Task, seconds: float) -> Sample:
-    certificate = replace(
-        sample.certificate,
-        seed=job.seed,
-        config_hash=digest(job.scene),
-        seconds=sample.certificate.seconds or seconds,
-        versions=task.versions | sample.certificate.versions,
-    )
-    return replace(
-        sample,
-        id=job.id,
-        kind=job.kind,  # type: ignore[arg-type]
-        seed=job.seed,
-        scene=job.scene,
-        labels=sample.labels | job.labels,
-        fabric=sample.fabric or job.labels.get("fabric", ""),
-        certificate=certificate,
-    )

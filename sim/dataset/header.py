@@ -109,8 +109,9 @@ def prepare_root(root: Path, header: Header) -> Header | None:
         if dropped:
             differs = describe_difference(before.config, header.config) or "the way samples are named"
             raise InputError(
-                f"{root}: holds a dataset of another config, {len(dropped)} of whose "
-                f"{len(before.splits)} samples the new one has not; differs: {differs}; write to another folder, or only extend the config"
+                f"{root}: holds a dataset of another config, {len(dropped)} of whose {len(before.splits)} "
+                f"samples the new one has not; differs: {differs}; "
+                "write to another folder, or only extend the config"
             )
     (root / SAMPLES).mkdir(parents=True, exist_ok=True)
     (root / PARTIAL).mkdir(exist_ok=True)

@@ -16,43 +16,10 @@ from muslin.garments import catalogue
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.config import DatasetConfig, Design, MotionClip, Shape
 from muslin.sim.dataset.header import digest
+from muslin.sim.dataset.jobs import Chain, Job, Plan
 
 TRAIN = "train"
 MEAN_SHAPE = "mean"
-
-
-@dataclass(frozen=True)
-class Job:
-    """One sample to make: the values of its scene, and an id that ends in a hash of all that makes its
-    geometry."""
-
-    id: str
-    kind: str
-    scene: dict[str, Any]
-    labels: dict[str, str]
-    split: str
-    seed: int
-
-
-@dataclass(frozen=True)
-class Chain:
-    """Jobs of one process: drapes along beta, each starting from the one before, or one sequence."""
-
-    jobs: tuple[Job, ...]
-
-
-@dataclass(frozen=True)
-class Plan:
-    chains: tuple[Chain, ...]
-
-    @property
-    def jobs(self) -> tuple[Job, ...]:
-        return tuple(job for chain in self.chains for job in chain.jobs)
-
-    @property
-    def splits(self) -> dict[str, str]:
-        """{sample id: split}, in plan order."""
-        return {job.id: job.split for job in self.jobs}
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,13 @@
 """A cheap, exact producer of samples: a rippling sheet that floats over a ball.
 
-The sheet is y = height + ripple sin(12 x + phase), its lowest point `clearance` above a ball of radius 0.3 m, so whether
-and where it meets the ball or not is known from geometry. Like a chain of real drapes, each sample depends on those before
-it in its chain: the phase is the sum of the betas so far.
+The sheet is y = height + ripple sin(12 x + phase), its lowest point `clearance` above a ball of radius 0.3 m,
+so whether it meets the ball is known from geometry. Like a chain of real drapes, each sample depends on those
+before it in its chain: the phase is the sum of the betas so far.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -15,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.config import DatasetConfig, parse_config
 from muslin.sim.dataset.sample import Sample
 
 RADIUS = 0.3
@@ -34,7 +35,9 @@ def sheet(n: int = 9) -> GarmentMesh:
     panel = np.stack([x, 1.0 - z], axis=1)
     corner = np.arange(n * n, dtype=np.int32).reshape(n, n)
     a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-    faces = np.concatenate([np.stack([p.ravel() for p in t], 1) for t in ((a, d, c), (a, c, b))]).astype(np.int32)
+    faces = np.concatenate([np.stack([p.ravel() for p in t], 1) for t in ((a, d, c), (a, c, b))]).astype(
+        np.int32
+    )
     return GarmentMesh(
         faces=faces,
         panel_faces=faces,
@@ -57,13 +60,25 @@ def sheet_positions(garment: GarmentMesh, height: float, phases: np.ndarray) -> 
 
 
 @lru_cache
-def ball() -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (1, N, 3) and faces of the ball."""
-    mesh = trimesh.creation.icosphere(subdivisions=3, radius=RADIUS)
-    return mesh.vertices[None].astype(np.float32), mesh.faces.astype(np.int32)
+def ball(n: int = 24) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (1, N, 3) and faces of the ball: poles, and n/2 - 1 circles of n vertices."""
+    polar, around = np.meshgrid(
+        np.pi * np.arange(1, n // 2) / (n // 2), 2 * np.pi * np.arange(n) / n, indexing="ij"
+    )
+    rings = np.stack([np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=-1)
+    vertices = np.concatenate([rings.reshape(-1, 3), [[0, 1, 0], [0, -1, 0]]])
+    ring = np.arange((n // 2 - 1) * n).reshape(-1, n)
+    after = np.roll(ring, -1, axis=1)
+    a, b, c, d = ring[:-1], ring[1:], after[1:], after[:-1]
+    top, bottom = np.full(n, len(vertices) - 2), np.full(n, len(vertices) - 1)
+    triangles = [(a, b, c), (a, c, d), (top, ring[0], after[0]), (bottom, after[-1], ring[-1])]
+    faces = np.concatenate([np.stack([corner.ravel() for corner in t], axis=1) for t in triangles])
+    return (RADIUS * vertices)[None].astype(np.float32), faces.astype(np.int32)
 
 
-def make_sample(sample_id: str = "sheet", frames: int = 1, clearance: float = 0.02, phase: float = 0.0) -> Sample:
+def make_sample(
+    sample_id: str = "sheet", frames: int = 1, clearance: float = 0.02, phase: float = 0.0
+) -> Sample:
     garment = sheet()
     vertices, faces = ball()
     phases = phase + 0.3 * np.arange(frames)
@@ -72,7 +87,9 @@ def make_sample(sample_id: str = "sheet", frames: int = 1, clearance: float = 0.
         kind="drape" if frames == 1 else "sequence",
         garment=garment,
         positions=sheet_positions(garment, RADIUS + clearance + RIPPLE, phases),
-        certificate=Certificate(cloth_cloth_intersections=0, cloth_body_intersections=0, min_distance_m=clearance),
+        certificate=Certificate(
+            cloth_cloth_intersections=0, cloth_body_intersections=0, min_distance_m=clearance
+        ),
         fps=None if frames == 1 else 30.0,
         obstacle_vertices=vertices,
         obstacle_faces=faces,
@@ -83,7 +100,7 @@ def make_sample(sample_id: str = "sheet", frames: int = 1, clearance: float = 0.
 
 def make_scene(values: dict[str, Any]) -> dict[str, Any]:
     """The scene as it is; ValueError for what a sheet does not know, as pydantic would raise."""
-    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "delay", "die"}
+    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "die"}
     if unknown:
         raise ValueError(f"unknown key {min(unknown)}")
     return values
@@ -92,12 +109,12 @@ def make_scene(values: dict[str, Any]) -> dict[str, Any]:
 def simulate(
     scenes: list[dict[str, Any]], device: str, progress: Callable[[int, int], None] | None
 ) -> Iterator[Sample]:
-    """Samples of a chain of scenes; `delay` s each, fails at shape `fail_at`, `die` ends the process."""
+    """Samples of a chain of scenes; SHEET_DELAY s each; fails at shape `fail_at`, `die` ends the process."""
     phase = 0.0
     for done, scene in enumerate(scenes):
         beta = scene.get("body", {}).get("beta", [0.0])
         phase += beta[0]
-        time.sleep(scene.get("delay", 0.0))
+        time.sleep(float(os.environ.get("SHEET_DELAY", "0")))
         if scene.get("fail_at") == beta[0]:
             raise InputError(f"cannot dress shape {beta[0]}")
         if scene.get("die"):
@@ -115,11 +132,22 @@ def files_of(root: Path) -> dict[str, bytes]:
         if file.is_file():
             data = file.read_bytes()
             if file.parent.suffix == ".zarr":
-                import json
-
                 values = json.loads(data)
                 values["attributes"]["meta"]["certificate"].pop("seconds")
                 values["attributes"].pop("meta_sha256")
                 data = json.dumps(values).encode()
             files[str(file.relative_to(root))] = data
     return files
+
+
+def sheets_config() -> DatasetConfig:
+    """Two chains of four drapes and a sequence of 30 frames."""
+    return parse_config(
+        {
+            "name": "sheets",
+            "shapes": [{"name": "s", "sweep": {"component": 0, "start": -1.0, "stop": 1.0, "count": 8}}],
+            "chain": 4,
+            "sequences": [{"clip": "wave", "end": 1.0}],
+            "splits": {"test": {"shapes": ["s-003"], "sequences": ["wave"]}},
+        }
+    )

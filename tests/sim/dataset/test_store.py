@@ -32,7 +32,9 @@ def test_every_field_survives_the_round_trip_bit_for_bit(root: Path) -> None:
         masked_faces=masked,
         seed=7,
         labels={"design": "sheet", "shape": "mean"},
-        certificate=Certificate(0, 0, 1e-3, 5, 0.02, 0.1, 7, "abc", 1.5, {"numpy": "2"}, {"iterations": [1, 2]}),
+        certificate=Certificate(
+            0, 0, 1e-3, 5, 0.02, 0.1, 7, "abc", 1.5, {"numpy": "2"}, {"iterations": [1, 2]}
+        ),
     )
     assert store.write_sample(root, written)
     read = store.read_sample(root, "sheet")
@@ -54,7 +56,9 @@ def test_every_field_survives_the_round_trip_bit_for_bit(root: Path) -> None:
 
 def test_body_track_keeps_float64(root: Path) -> None:
     draw = np.random.default_rng(0)
-    track = BodyTrack("female", "d", draw.normal(size=10), draw.normal(size=(1, 24, 3)), draw.normal(size=(1, 3)))
+    track = BodyTrack(
+        "female", "d", draw.normal(size=10), draw.normal(size=(1, 24, 3)), draw.normal(size=(1, 3))
+    )
     sample = replace(make_sample(), body=track, obstacle_vertices=None, obstacle_faces=None)
     store.write_sample(root, sample)
     read = store.read_sample(root, "sheet").body
@@ -136,7 +140,7 @@ def test_a_sample_of_a_newer_schema_is_refused(root: Path) -> None:
     values["attributes"]["meta"]["schema_version"] = 2
     values["attributes"]["meta_sha256"] = digest(values["attributes"]["meta"])
     file.write_text(json.dumps(values))
-    with pytest.raises(InputError, match="newer than 1.*update muslin"):
+    with pytest.raises(InputError, match=r"newer than 1.*update muslin"):
         store.read_sample(root, "sheet")
 
 

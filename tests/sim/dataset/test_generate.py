@@ -1,0 +1,204 @@
+"""Same configuration, same bytes: with any number of workers, in one go or killed and resumed."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from sheet_producer import files_of, make_scene, sheets_config, simulate
+
+from muslin.garments.errors import InputError
+from muslin.sim.dataset import store
+from muslin.sim.dataset.config import DatasetConfig, parse_config
+from muslin.sim.dataset.generate import GenerateReport, generate, solver_digest
+from muslin.sim.dataset.plan import plan
+from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.schema import INDEX, PARTIAL, SAMPLES
+
+MAIN = Path(__file__).parent / "sheet_main.py"
+
+
+def run(config: DatasetConfig, out: Path, workers: int = 1) -> GenerateReport:
+    return generate(config, out, workers=workers, simulate=simulate, make_scene=make_scene)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The dataset made in one go by one worker."""
+    out = tmp_path_factory.mktemp("whole") / "data"
+    report = run(sheets_config(), out)
+    assert (len(report.made), len(report.kept), report.failed) == (9, 0, {})
+    return out
+
+
+def test_more_workers_make_the_same_bytes(whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "data"
+    told: list[tuple[float, int]] = []
+    report = generate(
+        sheets_config(),
+        out,
+        workers=3,
+        simulate=simulate,
+        make_scene=make_scene,
+        progress=lambda done, total, message: told.append((done, total)),
+    )
+    assert files_of(out) == files_of(whole)
+    assert report.made == tuple(job.id for job in plan(sheets_config()).jobs)
+    assert told[-1] == (9.0, 9)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_what_is_there_is_kept_and_what_is_gone_is_made_again(whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "data"
+    run(sheets_config(), out)
+    ids = open_dataset(out).ids
+    before = files_of(out)
+    assert run(sheets_config(), out).kept == ids
+    # The third of a chain of four: it must be made from the start of its chain, the others must not be
+    # touched.
+    for name in (ids[2], ids[8]):
+        for file in sorted(store.sample_path(out, name).rglob("*"), reverse=True):
+            file.unlink() if file.is_file() else file.rmdir()
+        store.sample_path(out, name).rmdir()
+    stamps = {name: store.sample_path(out, name).stat().st_mtime_ns for name in store.stored_ids(out)}
+    report = run(sheets_config(), out)
+    assert report.made == (ids[2], ids[8])
+    assert files_of(out) == before
+    assert stamps == {name: store.sample_path(out, name).stat().st_mtime_ns for name in stamps}
+
+
+def test_extension_adds_and_keeps(tmp_path: Path) -> None:
+    def config(count: int, **more: object) -> DatasetConfig:
+        shapes = [{"name": "s", "random": {"count": count, "components": 2}}]
+        return parse_config({"kind": "drape", "shapes": shapes, **more})
+
+    first = run(config(2), tmp_path / "data")
+    second = run(config(3), tmp_path / "data")
+    assert second.kept == first.made
+    assert len(second.made) == 1
+    assert open_dataset(tmp_path / "data").ids == (*second.kept, *second.made)
+    splits = {"test": {"shapes": ["s-001"]}}
+    assert run(config(3, splits=splits), tmp_path / "data").made == ()
+    assert [row["split"] for row in open_dataset(tmp_path / "data").rows] == ["train", "test", "train"]
+    before = files_of(tmp_path / "data")
+    with pytest.raises(InputError, match=r"another config.*shapes\[0\].random.count: 3 -> 2"):
+        run(config(2), tmp_path / "data")
+    assert files_of(tmp_path / "data") == before
+
+
+def test_a_chain_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None:
+    config = sheets_config()
+    values = config.model_dump() | {"scene": {"fail_at": config.shapes[0].sweep.start}}
+    report = run(parse_config(values), tmp_path / "data")
+    assert len(report.made) == 5
+    assert len(report.failed) == 4
+    assert set(report.failed.values()) == {"InputError: cannot dress shape -1.0"}
+    assert open_dataset(tmp_path / "data").missing == tuple(report.failed)
+
+
+def test_a_worker_that_dies_is_told_with_a_remedy(tmp_path: Path) -> None:
+    config = parse_config({"kind": "drape", "scene": {"die": True}})
+    with pytest.raises(InputError, match=r"a worker process died.*fewer --workers"):
+        run(config, tmp_path / "data")
+
+
+def test_a_scene_that_cannot_be_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    config = parse_config({"kind": "drape", "scene": {"gravty": 9.81}})
+    with pytest.raises(InputError, match=r"scene of sample garment_base_\w+: unknown key gravty"):
+        run(config, tmp_path / "data")
+    with pytest.raises(InputError, match="workers = 0"):
+        run(sheets_config(), tmp_path / "data", workers=0)
+    assert not (tmp_path / "data").exists()
+
+
+def other_simulate(*arguments: object) -> object:
+    return simulate(*arguments)  # type: ignore[arg-type]
+
+
+def test_samples_of_two_solvers_are_not_mixed(tmp_path: Path) -> None:
+    def config(count: int) -> DatasetConfig:
+        return parse_config({"kind": "drape", "shapes": [{"random": {"count": count}}]})
+
+    run(config(1), tmp_path / "data")
+    assert solver_digest(simulate) != solver_digest(other_simulate)
+    with pytest.raises(InputError, match=r"another solver.*another folder"):
+        generate(config(2), tmp_path / "data", simulate=other_simulate, make_scene=make_scene)
+    complete = generate(config(1), tmp_path / "data", simulate=other_simulate, make_scene=make_scene)
+    assert (len(complete.made), len(complete.kept)) == (0, 1)
+
+
+def test_the_index_is_rebuilt_when_missing(whole: Path) -> None:
+    rows = open_dataset(whole).rows
+    index = (whole / INDEX).read_bytes()
+    (whole / INDEX).unlink()
+    assert open_dataset(whole).rows == rows
+    run(sheets_config(), whole)
+    assert (whole / INDEX).read_bytes() == index
+
+
+def test_killed_at_any_moment_it_completes_to_the_same_dataset(whole: Path, tmp_path: Path) -> None:
+    delay = 0.1
+    out = tmp_path / "killed"
+    moments = random.Random(4)
+    kept = 0
+    for _ in range(2):
+        process = start(out, delay)
+        wait_for_samples(out, kept + 1)
+        time.sleep(moments.uniform(0.0, 2 * delay))
+        workers = children(process.pid)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        wait_until_gone(workers)
+        before, kept = kept, len(store.stored_ids(out))
+        assert before < kept
+        for name in store.stored_ids(out):
+            store.read_sample(out, name)
+    assert kept < 9, "the run ended before it was killed"
+    last = start(out, 0.0)
+    told, _ = last.communicate(timeout=60)
+    assert told.split() == [str(9 - kept), str(kept), "0"]
+    assert files_of(out) == files_of(whole)
+    assert not list((out / PARTIAL).iterdir())
+    assert [row["id"] for row in open_dataset(out).rows] == list(open_dataset(whole).ids)
+
+
+def start(out: Path, delay: float) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, str(MAIN), str(out), "2"],
+        env=os.environ | {"SHEET_DELAY": str(delay)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+
+
+def wait_for_samples(out: Path, count: int) -> None:
+    end = time.monotonic() + 30.0
+    while not (out / SAMPLES).is_dir() or len(store.stored_ids(out)) < count:
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def children(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def wait_until_gone(pids: list[int]) -> None:
+    """The workers of a killed parent must end by themselves, and soon."""
+    end = time.monotonic() + 5.0
+    while alive := [pid for pid in pids if os.path.exists(f"/proc/{pid}") and not zombie(pid)]:
+        assert time.monotonic() < end, f"orphans: {alive}"
+        time.sleep(0.01)
+
+
+def zombie(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
