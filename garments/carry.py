@@ -17,15 +17,15 @@ def carry(
 ) -> NDArray[np.float64]:
     """Points (N, 2) of the mesh after its first B points moved to `boundary` (B, 2), metres.
 
-    The boundary moves along straight lines in STEPS equal steps. In each, the interior follows by the displacement u
-    that is harmonic on the mesh as it then lies, with stiffness k_f a triangle:
+    The boundary moves along straight lines in STEPS equal steps. In each, the interior follows by the
+    displacement u that is harmonic on the mesh as it then lies, with stiffness k_f a triangle:
 
         sum_f k_f grad(u)|_f . grad(phi_i)|_f area_f = 0   at every interior vertex i,
         k_f = q_f / sqrt(a_f),   q_f = (l_1^2 + l_2^2 + l_3^2) / (4 sqrt(3) area_f) >= 1,
 
-    l the lengths of its sides, a_f its area over its area at the start, over the median of that ratio. One step with
-    k_f = 1 is the harmonic map; it folds at concave boundaries (a deep neckline), while small steps that stiffen
-    what is already squeezed or flattened do not. A boundary that does not move moves nothing.
+    l the lengths of its sides, a_f its area over its area at the start, over the median of that ratio. One
+    step with k_f = 1 is the harmonic map; it folds at concave boundaries (a deep neckline), while small steps
+    that stiffen what is already squeezed or flattened do not. A boundary that does not move moves nothing.
     """
     fixed = len(boundary)
     start = signed_areas(points, faces)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from muslin.garments.design import Design
+from muslin.garments.designs.sheet import SHEET
 from muslin.garments.designs.tee import TEE
 from muslin.garments.errors import InputError
 
-DESIGNS: dict[str, Design] = {design.name: design for design in (TEE,)}
+DESIGNS: dict[str, Design] = {design.name: design for design in (TEE, SHEET)}
 
 
 def names() -> tuple[str, ...]:

@@ -19,8 +19,8 @@ class Cut:
     """Triangulated panels of a pattern, not yet placed in the uv layout.
 
     panel_faces: (F, 3) int32, counter-clockwise, over panel vertices
-    panel_vertices: (P, 2) float64, metres; panel after panel, in each the boundary first (counter-clockwise from the
-        start of the panel's first edge), then the interior
+    panel_vertices: (P, 2) float64, metres; panel after panel, in each the boundary first, counter-clockwise
+        from the start of the panel's first edge, then the interior
     panel_to_vertex: (P,) int32, sewn vertex of each panel vertex
     face_panel: (F,) int32
     panel_starts: (panels + 1,) int64, first vertex of each panel, then P
@@ -70,8 +70,9 @@ class Cut:
 def cut_pattern(pattern: Pattern, edge_length: float, seed: int) -> Cut:
     """Triangulate every panel of a valid pattern with edges of about `edge_length` metres.
 
-    Both sides of a seam are sampled alike; panel vertices that are sewn together, corners where several panels meet
-    included, share one sewn vertex. Raises InputError if a panel is too narrow for the edge length.
+    Both sides of a seam are sampled alike; panel vertices that are sewn together, corners where several
+    panels meet included, share one sewn vertex. Raises InputError if a panel is too narrow for the edge
+    length.
     """
     sampling = BoundarySampling.of(pattern, edge_length)
     sewn = sampling.sewn(pattern)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -20,6 +22,8 @@ from muslin.garments.seams import EdgeRef
 
 FORMATS = (".png", ".svg")
 GAP = 0.09  # metres between panels, room for the labels
+CHARACTER_WIDTH = 0.0064  # metres on paper of a label's character
+_CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "rotation_mode": "anchor"}
 _CLOTH, _INK, _FREE = "#f4efe6", "#2b2b2b", "#8a8a8a"
 _SEAM_COLOURS = (
     "#c0392b", "#2471a3", "#1e8449", "#b9770e", "#7d3c98",
@@ -30,8 +34,8 @@ _SEAM_COLOURS = (
 def draw_pattern(pattern: Pattern, mesh: GarmentMesh | None = None) -> Figure:
     """Figure of all panels to one scale; the two edges of a seam share a colour and a number.
 
-    Each edge is labelled with its name and length in centimetres; hems and other free edges are grey, the arrow is the
-    grain. With a mesh of the pattern its triangles are drawn too.
+    Each edge is labelled with its name and length in centimetres; hems and other free edges are grey, the
+    arrow is the grain. With a mesh of the pattern its triangles are drawn too.
     """
     pattern.validate()
     outlines = [panel.outline() for panel in pattern.panels]
@@ -67,8 +71,6 @@ def save_drawing(pattern: Pattern, path: Path | str, mesh: GarmentMesh | None = 
         raise InputError(f"{path}: cannot draw to '{path.suffix}'; allowed: {', '.join(FORMATS)}")
     # A fixed salt and no date: the same pattern gives the same bytes.
     metadata = {"Date": None} if path.suffix.lower() == ".svg" else None
-    from matplotlib import rc_context
-
     with rc_context({"svg.hashsalt": "muslin"}):
         draw_pattern(pattern, mesh).savefig(path, dpi=150, facecolor="white", metadata=metadata)
 
@@ -85,8 +87,8 @@ def _draw_panel(axes: Axes, panel: Panel, shift: NDArray[np.float64], seam_of: M
         arrowprops={"arrowstyle": "->", "color": _FREE, "linewidth": 1.0},
     )
     axes.text(
-        centre[0] + 0.012, centre[1], panel.name.replace("_", " "), fontsize=15, va="center", color=_INK, zorder=4,
-        bbox={"facecolor": _CLOTH, "edgecolor": "none", "pad": 1.5},
+        centre[0] + 0.012, centre[1], panel.name.replace("_", " "), fontsize=15, va="center", color=_INK,
+        zorder=4, bbox={"facecolor": _CLOTH, "edgecolor": "none", "pad": 1.5},
     )  # fmt: skip
     for edge in panel.edges:
         number = seam_of.get(EdgeRef(panel.name, edge.name))
@@ -96,15 +98,14 @@ def _draw_panel(axes: Axes, panel: Panel, shift: NDArray[np.float64], seam_of: M
         tangent = line[25] - line[23]
         tangent /= np.linalg.norm(tangent)
         outward = np.array([tangent[1], -tangent[0]])
-        angle = float(np.degrees(np.arctan2(tangent[1], tangent[0])))
-        angle = (angle + 90.0) % 180.0 - 90.0
         label = f"{edge.name.replace('_', ' ')}  {100.0 * edge.curve.length:.1f} cm"
-        axes.text(
-            *(line[24] + 0.016 * outward), label, fontsize=8, color=colour, rotation=angle,
-            rotation_mode="anchor", ha="center", va="center", zorder=4,
-        )  # fmt: skip
+        # Where the edge curves outward past the label's baseline, the label moves beyond it.
+        beside = np.abs((line - line[24]) @ tangent) < 0.5 * len(label) * CHARACTER_WIDTH
+        bulge = ((line - line[24]) @ outward)[beside].max()
+        x, y = line[24] + (bulge + 0.014) * outward
+        angle = (float(np.degrees(np.arctan2(tangent[1], tangent[0]))) + 90.0) % 180.0 - 90.0
+        axes.text(x, y, label, color=colour, rotation=angle, fontsize=8, zorder=4, **_CENTRED)
         if number is not None:
-            axes.text(
-                *(line[24] - 0.022 * outward), str(number), fontsize=9, color="white", ha="center",
-                va="center", zorder=4, bbox={"boxstyle": "circle,pad=0.25", "color": colour},
-            )  # fmt: skip
+            x, y = line[24] - 0.022 * outward
+            bubble = {"boxstyle": "circle,pad=0.25", "color": colour}
+            axes.text(x, y, str(number), color="white", fontsize=9, zorder=4, bbox=bubble, **_CENTRED)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 def arrange(sizes: Sequence[ArrayLike], gap: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lower left corners (N, 2) of N boxes and the size (2,) of the smallest sheet found for them.
 
-    sizes: width and height of each box; neighbours stay `gap` apart. Boxes go on shelves, highest first; of all shelf
-    widths the one is taken that makes the sheet's longer side shortest.
+    sizes: width and height of each box; neighbours stay `gap` apart. Boxes go on shelves, highest first; of
+    all shelf widths the one is taken that makes the sheet's longer side shortest.
     """
     boxes = np.array(sizes, dtype=np.float64).reshape(-1, 2)
     order = np.argsort(-boxes[:, 1], kind="stable")

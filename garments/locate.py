@@ -14,8 +14,8 @@ def locate(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle (Q,) and barycentric coordinates (Q, 3) of each query point (Q, 2).
 
-    points: (N, 2), faces: (F, 3), counter-clockwise. A query outside the triangulation gets the triangle in which its
-    least barycentric coordinate is greatest, and extrapolating (negative) coordinates.
+    points: (N, 2), faces: (F, 3), counter-clockwise. A query outside the triangulation gets the triangle in
+    which its least barycentric coordinate is greatest, and extrapolating (negative) coordinates.
     """
     corners = points[faces]
     face = np.zeros(len(queries), dtype=np.int64)

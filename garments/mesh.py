@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from muslin.garments.errors import InputError
 
@@ -52,7 +54,7 @@ class GarmentMesh:
 
     @cached_property
     def boundary_loops(self) -> tuple[NDArray[np.int32], ...]:
-        """Closed boundary curves of the sewn mesh (hem, neckline, cuffs), each an ordered array of vertices."""
+        """Closed boundary curves of the sewn mesh (hem, neckline, cuffs), each as vertices in order."""
         following = {int(a): int(b) for a, b in self.boundary_edges}
         loops = []
         while following:
@@ -80,9 +82,9 @@ class GarmentMesh:
     @cached_property
     def vertex_areas(self) -> NDArray[np.float64]:
         """(V,) areas in panel space, a third of each adjacent triangle, square metres."""
-        return np.bincount(
-            self.faces.ravel(), weights=np.repeat(self.face_areas / 3.0, 3), minlength=self.num_vertices
-        )
+        areas = np.zeros(self.num_vertices)
+        np.add.at(areas, self.faces, self.face_areas[:, None] / 3.0)
+        return areas
 
     @property
     def euler_characteristic(self) -> int:
@@ -92,9 +94,9 @@ class GarmentMesh:
     def validate(self) -> None:
         """InputError unless the mesh is a non-empty, finite, consistently oriented manifold.
 
-        Checks, in this order: shapes, index ranges, finite coordinates, that panel and sewn triangles agree, that
-        every panel triangle has positive area, that every vertex is used, at most two faces an edge in opposite
-        directions, one fan of faces a vertex, uv in [0, 1].
+        Checks, in this order: shapes, index ranges, finite coordinates, that panel and sewn triangles agree,
+        that every panel triangle has positive area, that every vertex is used, at most two faces an edge in
+        opposite directions, one fan of faces a vertex, uv in [0, 1].
         """
         self._validate_arrays()
         here = f"mesh '{self.name}'"
@@ -108,11 +110,9 @@ class GarmentMesh:
                 f"{here}: {len(bad)} panel triangles are inverted or empty, first {bad[0]} with area "
                 f"{self.face_areas[bad[0]]:g} m^2; all must be counter-clockwise as seen from outside"
             )
-        panel_of = np.full(len(self.panel_vertices), -1)
-        panel_of[self.panel_faces] = self.face_panel[:, None]
-        if (panel_of[self.panel_faces] != self.face_panel[:, None]).any():
+        if (self.panel_vertex_panel[self.panel_faces] != self.face_panel[:, None]).any():
             raise InputError(f"{here}: a panel vertex belongs to two panels; panels share sewn vertices only")
-        if (panel_of < 0).any() or len(np.unique(self.panel_to_vertex)) != self.num_vertices:
+        if (self.panel_vertex_panel < 0).any() or len(np.unique(self.panel_to_vertex)) != self.num_vertices:
             raise InputError(f"{here}: a vertex belongs to no triangle; remove it")
         validate_manifold(self.faces, here)
 
@@ -206,12 +206,9 @@ def _boundary(faces: NDArray[np.int32]) -> NDArray[np.int32]:
 def _fans(faces: NDArray[np.int32]) -> NDArray[np.int64]:
     """(V,) number of edge-connected groups of faces around each vertex.
 
-    In an edge-manifold mesh the faces at a vertex form closed fans and open ones; each open fan has one outgoing
-    boundary edge. Corners are joined across interior edges; the groups that remain are the fans.
+    In an edge-manifold mesh the faces at a vertex form closed fans and open ones; each open fan has one
+    outgoing boundary edge. Corners are joined across interior edges; the groups that remain are the fans.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     count = len(faces)
     corner = np.arange(3 * count).reshape(count, 3)
     # Half edge a->b of a face: corner at a (`tail`), corner at b (`head`).

@@ -8,9 +8,9 @@
       "seams": [["front.shoulder_left", "back.shoulder_left"], ...]
     }
 
-The edges of a panel run counter-clockwise as seen from outside the garment, grain along +y; an edge ends where the
-next one starts. It is straight without `controls`, a cubic Bezier curve with two. A seam names two edges as
-"panel.edge"; they are sewn together in opposite directions.
+The edges of a panel run counter-clockwise as seen from outside the garment, grain along +y; an edge ends
+where the next one starts. It is straight without `controls`, a cubic Bezier curve with two. A seam names two
+edges as "panel.edge"; they are sewn together in opposite directions.
 """
 
 from __future__ import annotations

@@ -16,15 +16,18 @@ SMOOTHING_STEPS = 30
 def triangulate_polygon(
     boundary: NDArray[np.float64], edge_length: float, rng: np.random.Generator, name: str
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Points (N, 2), the B boundary points first, and counter-clockwise faces (F, 3) int32 of a simple polygon.
+    """Points (N, 2), the B boundary points first, and counter-clockwise faces (F, 3) int32 of a polygon.
 
-    boundary: (B, 2), metres, counter-clockwise, sampled at about `edge_length`; it is kept as it is.
+    boundary: (B, 2), metres, counter-clockwise, simple, sampled at about `edge_length`; it is kept as it is.
 
-    A hexagonal lattice of random offset and angle fills the polygon; then Delaunay triangulation alternates with
-    moves of every interior point to the mean of its triangles' circumcentres, weighted by area (optimal Delaunay
-    triangulation: L. Chen and M. Holst 2011, "Efficient mesh optimization schemes based on optimal Delaunay
-    triangulations", eq. 4.5). A circumcentre outside its triangle is replaced by the centroid, which keeps points
-    near the boundary inside.
+    A hexagonal lattice of random offset and angle fills the polygon. Then Delaunay triangulation alternates
+    with moves of every interior point i to the area-weighted mean of its triangles' circumcentres c_f,
+
+        x_i = sum_f |f| c_f / sum_f |f|,
+
+    optimal Delaunay triangulation (L. Chen and M. Holst 2011, "Efficient mesh optimization schemes based on
+    optimal Delaunay triangulations"). In obtuse triangles the centroid stands for the circumcentre, which may
+    lie outside; that keeps points near the boundary inside.
 
     Raises InputError if the polygon is too narrow for the edge length.
     """
@@ -38,7 +41,7 @@ def triangulate_polygon(
     missing = _missing_edges(faces, fixed)
     if len(missing) or len(faces) != 2 * len(points) - fixed - 2:
         raise InputError(
-            f"panel '{name}' cannot be triangulated at edge length {edge_length:g} m: it is too narrow there; "
+            f"panel '{name}' cannot be triangulated at edge length {edge_length:g} m: it is too narrow; "
             "choose a smaller edge length"
         )
     return points, faces
@@ -77,8 +80,9 @@ def _lattice(
 def _constrained_delaunay(points: NDArray[np.float64], fixed: int) -> NDArray[np.int32]:
     """Counter-clockwise Delaunay triangles inside the polygon of the first `fixed` points.
 
-    Interior points stay clear of the boundary, so its edges are Delaunay edges; the caller checks that none is
-    missing. Then a triangle with an interior point lies inside, and only the others need the centroid test.
+    Interior points stay clear of the boundary, so its edges are Delaunay edges; the caller checks that none
+    is missing. Then a triangle with an interior point lies inside, and only the others need the centroid
+    test.
     """
     faces = Delaunay(points).simplices.astype(np.int32)
     areas = signed_areas(points, faces)

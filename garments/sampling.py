@@ -18,8 +18,8 @@ class BoundarySampling:
     """How many segments each edge of a pattern has, and which boundary vertices are sewn together.
 
     segments: segments of each edge; equal on both sides of a seam
-    A panel's boundary vertices run counter-clockwise from the start of its first edge; the vertices of all panels
-    are numbered one panel after the other.
+    A panel's boundary vertices run counter-clockwise from the start of its first edge; the vertices of all
+    panels are numbered one panel after the other.
     """
 
     segments: dict[EdgeRef, int]
@@ -60,7 +60,7 @@ class BoundarySampling:
         return vertices
 
     def sewn(self, pattern: Pattern) -> NDArray[np.int32]:
-        """(B_total,) group of each boundary vertex; vertices sewn together, corners included, share a group."""
+        """(B_total,) group of each boundary vertex; vertices sewn together share one, corners too."""
         vertices = self.edge_vertices(pattern)
         total = sum(self.segments.values())
         pairs = [(vertices[seam.first], vertices[seam.second][::-1]) for seam in pattern.seams]

@@ -11,9 +11,10 @@ from muslin.garments.mesh import GarmentMesh
 def subdivide(mesh: GarmentMesh) -> tuple[GarmentMesh, NDArray[np.int32]]:
     """Finer mesh, and parents (V_fine, 2) int32: the sewn vertices whose mean each fine vertex is.
 
-    x_fine = (x[parents[:, 0]] + x[parents[:, 1]]) / 2 for any vertex quantity x (V, ...); the vertices of `mesh` come
-    first, in order, with both parents themselves, then one vertex an edge in the order of `mesh.edges`. Panel
-    vertices and uv are halved in the same way, so the fine mesh covers exactly the same surface.
+    x_fine = (x[parents[:, 0]] + x[parents[:, 1]]) / 2 for any vertex quantity x (V, ...); the vertices of
+    `mesh` come first, in order, with both parents themselves, then one vertex an edge in the order of
+    `mesh.edges`. Panel vertices and uv are halved in the same way, so the fine mesh covers exactly the same
+    surface.
     """
     panel_edges, panel_faces = _split(mesh.panel_faces, len(mesh.panel_vertices))
     edges, faces = _split(mesh.faces, mesh.num_vertices)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
 import numpy as np
 
 from muslin.garments import catalogue
 from muslin.garments.carry import carry
-from muslin.garments.cut import Cut, cut_pattern
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
-from muslin.garments.uv_layout import reference_panels
+from muslin.garments.topology import reference, topology
 
 # Edge lengths, metres, on the reference member; the keys are near the numbers of vertices they give.
 EDGE_LENGTHS = {403: 0.05123, 1400: 0.0276, 4000: 0.0163214, 17246: 0.0078844}
@@ -20,7 +18,7 @@ NAMES = {"coarse": 403, "medium": 1400, "fine": 4000, "full": 17246}
 
 
 def resolution_of(resolution: int | str) -> int:
-    """The key of a resolution: "coarse", "medium", "fine", "full" or 403, 1400, 4000, 17246; else InputError."""
+    """The resolution as a key of EDGE_LENGTHS, from that key or a name in NAMES; InputError for any other."""
     key = NAMES.get(resolution, resolution) if isinstance(resolution, str) else resolution
     if isinstance(key, str) and key.isdigit():
         key = int(key)
@@ -37,21 +35,18 @@ def template(
 ) -> GarmentMesh:
     """Mesh of the member of a design with these parameters (metres), on the fixed connectivity of the family.
 
-    faces, panel_faces, panel_to_vertex, face_panel and uv are the same for all members; only panel_vertices and
-    parameters differ. Long members have stretched triangles: the connectivity was made for the reference member.
+    faces, panel_faces, panel_to_vertex, face_panel and uv are the same for all members; only panel_vertices
+    and parameters differ. Long members have stretched triangles: the connectivity was made for the reference
+    member.
     """
     design = catalogue.get(design_name)
     pattern = design.pattern(**dict(parameters or {}))
-    reference = reference_panels(design_name)
-    topology = _topology(design_name, resolution_of(resolution))
+    key = resolution_of(resolution)
+    atlas = reference(design_name).atlas
+    cut = topology(design_name, str(key), EDGE_LENGTHS[key])
     points, uv = [], []
     for k, panel in enumerate(pattern.panels):
-        boundary = topology.sampling.points(pattern, panel.name)
-        points.append(carry(topology.vertices_of(k), topology.faces_of(k), boundary))
-        uv.append(reference.atlas.place(topology.vertices_of(k), k))
-    return topology.mesh(pattern, np.concatenate(points), np.concatenate(uv))
-
-
-@lru_cache(maxsize=16)
-def _topology(design_name: str, resolution: int) -> Cut:
-    return cut_pattern(reference_panels(design_name).pattern, EDGE_LENGTHS[resolution], seed=0)
+        boundary = cut.sampling.points(pattern, panel.name)
+        points.append(carry(cut.vertices_of(k), cut.faces_of(k), boundary))
+        uv.append(atlas.place(cut.vertices_of(k), k))
+    return cut.mesh(pattern, np.concatenate(points), np.concatenate(uv))

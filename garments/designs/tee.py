@@ -1,8 +1,8 @@
 """The tee family: tops, t-shirts, sweaters, short and long dresses from one layout with set-in sleeves.
 
-Panel frames (metres). front: x = world x, y = height above the high point of the shoulder (HPS). back: x = -world x
-(seen from behind), same y. Sleeves: y from cuff to shoulder, cap top at the origin, x = 0 along the top of the arm;
-+x lies at the wearer's back on sleeve_left, at the wearer's front on sleeve_right.
+Panel frames (metres). front: x = world x, y = height above the high point of the shoulder (HPS). back: x =
+-world x (seen from behind), same y. Sleeves: y from cuff to shoulder, cap top at the origin, x = 0 along the
+top of the arm; +x lies at the wearer's back on sleeve_left, at the wearer's front on sleeve_right.
 
 Construction of the half front, wearer's left (x > 0):
 
@@ -11,9 +11,9 @@ Construction of the half front, wearer's left (x > 0):
     U = (chest / 4, -d)                 underarm point, d the armhole depth
     H = U + drop (f, -1)                hem at the side seam, f the flare (tangent of its angle)
 
-The armhole leaves T at a right angle to the shoulder seam and reaches U level, the sleeve cap is level at its top and
-at its ends: around T and U the sewn panels lie flat, without a cone point. The half widths of the sleeve are solved so
-that each half of the cap is as long as the armhole it is sewn into.
+The armhole leaves T at a right angle to the shoulder seam and reaches U level, the sleeve cap is level at its
+top and at its ends: around T and U the sewn panels lie flat, without a cone point. The half widths of the
+sleeve are solved so that each half of the cap is as long as the armhole it is sewn into.
 """
 
 from __future__ import annotations
@@ -159,10 +159,10 @@ def _body_panel(
 
 
 def _hem(underarm: Point, slope: float, length: float) -> tuple[Point, CubicBezier]:
-    """Hem point at x > 0 and the hem, an arc at right angles to both side seams that is lowest at (0, -length).
+    """Hem point at x > 0 and the hem: an arc, lowest at (0, -length), square to both side seams.
 
-    An arc about the point where the side seams would meet hangs level. Radius R and half angle phi = atan(slope);
-    the cubic through both ends has handles (4/3) tan(phi / 2) R.
+    An arc about the point where the side seams would meet hangs level. Radius R and half angle phi =
+    atan(slope); the cubic through both ends has handles (4/3) tan(phi / 2) R.
     """
     phi = math.atan(slope)
     apex = underarm[1] + underarm[0] / slope
