@@ -101,7 +101,9 @@ def _arrays(path: Path) -> dict[str, NDArray]:
         raise
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError) as error:
         why = "it holds Python objects, which are never loaded" if "pickle" in str(error) else str(error)
-        raise InputError(f"{path}: cannot be read ({why}); {_ALLOWED}; save it anew without objects") from error
+        raise InputError(
+            f"{path}: cannot be read ({why}); {_ALLOWED}; save it anew without objects"
+        ) from error
 
 
 def _check_kind(path: Path, keys: set[str]) -> None:
@@ -159,4 +161,6 @@ def _frame_rate(path: Path, arrays: dict[str, NDArray]) -> float:
             if value.size == 1 and value.item() > 0.0:
                 return float(value.item())
             raise InputError(f"{path}: {key} is {value.tolist()}; one positive number of frames a second")
-    raise InputError(f"{path}: no frame rate; `mocap_framerate` (or `mocap_frame_rate`) is needed; {_ALLOWED}")
+    raise InputError(
+        f"{path}: no frame rate; `mocap_framerate` (or `mocap_frame_rate`) is needed; {_ALLOWED}"
+    )

@@ -32,6 +32,7 @@ def load_motion(name_or_path: str | Path, rest_pelvis: ArrayLike = (0.0, 0.0, 0.
         return read_amass(ASSETS / f"{name}.npz", rest_pelvis, name=name)
     if Path(name).suffix.lower() != ".npz":
         raise InputError(
-            f"motion {name!r} is unknown; allowed are {', '.join(motion_names())}, or the path of an AMASS .npz file"
+            f"motion {name!r} is unknown; allowed are {', '.join(motion_names())}, "
+            f"or the path of an AMASS .npz file"
         )
     return read_amass(name, rest_pelvis)

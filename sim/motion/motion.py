@@ -73,7 +73,9 @@ class Motion:
             arrays[key].setflags(write=False)
             object.__setattr__(self, key, arrays[key])
         if not (np.isfinite(fps) and fps > 0.0):
-            raise InputError(f"motion {name!r}: fps is {fps}; it must be a positive number of frames a second")
+            raise InputError(
+                f"motion {name!r}: fps is {fps}; it must be a positive number of frames a second"
+            )
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "fps", float(fps))
         object.__setattr__(self, "source", source)
@@ -169,8 +171,8 @@ class Motion:
 
     def _with(
         self,
-        poses: ArrayLike,
-        translations: ArrayLike,
+        poses: Array,
+        translations: Array,
         *,
         fps: float | None = None,
         name: str | None = None,

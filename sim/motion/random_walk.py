@@ -40,7 +40,9 @@ class PoseSpace:
     def of(cls, motions: Sequence[Motion], variance: float = 0.95) -> PoseSpace:
         """The fewest components that explain `variance` of the poses of `motions`, at least one."""
         if not motions or not 0.0 < variance <= 1.0:
-            raise InputError(f"pose space of {len(motions)} motions, variance {variance}; need >= 1, in (0, 1]")
+            raise InputError(
+                f"pose space of {len(motions)} motions, variance {variance}; need >= 1, in (0, 1]"
+            )
         seen = np.concatenate([seen_coordinates(motion.poses) for motion in motions])
         if len(seen) < 2:
             raise InputError("pose space of one pose; at least two frames are needed")
@@ -100,5 +102,6 @@ def random_walk(
     times = np.arange(int(np.floor(seconds * fps + 1e-6)) + 1) / fps
     poses = np.zeros((len(times), 24, 3))
     poses[:, 1:] = np.clip(spline(times), space.low, space.high).reshape(-1, 23, 3)
-    source = f"random walk (seed {seed}, stride {stride:g} s, memory {memory:g}, spread {spread:g}) among {space.source}"
+    how = f"seed {seed}, stride {stride:g} s, memory {memory:g}, spread {spread:g}"
+    source = f"random walk ({how}) among {space.source}"
     return Motion(f"random_walk_{seed}", poses, np.tile(translation, (len(times), 1)), fps, source)

@@ -25,6 +25,9 @@ from muslin.sim.motion.rotations import (
 
 Array = NDArray[np.float64]
 
+STRAIGHT = np.radians(10.0)
+"""Radians: a cycle whose heading differs by less from start to end goes straight; the rest is sway."""
+
 _HORIZONTAL = np.array([1.0, 0.0, 1.0])
 
 
@@ -39,14 +42,17 @@ def loop(motion: Motion, count: int, seam: float = 0.25) -> Motion:
     if count < 1:
         raise InputError(f"motion {motion.name!r}: loop count is {count}; it must be at least 1")
     if motion.num_frames < 3:
-        raise InputError(f"motion {motion.name!r}: {motion.num_frames} frames are too few to loop; at least 3")
+        raise InputError(
+            f"motion {motion.name!r}: {motion.num_frames} frames are too few to loop; at least 3"
+        )
     frames = motion.num_frames - 1
     reach = min(max(seam * motion.fps, 1.0), frames / 2)
     time = np.arange(frames + 1)
     weight = 0.5 * (smoothstep(1.0 - (frames - time) / reach) - smoothstep(1.0 - time / reach))
 
     q, pelvis = motion.quaternions, motion.pelvis
-    turn = float(heading(q[-1, 0]) - heading(q[0, 0]))
+    turn = float(heading(multiply(q[-1, 0], conjugate(q[0, 0]))))
+    turn = 0.0 if abs(turn) < STRAIGHT else turn
     start = q[0].copy()
     start[0] = multiply(about_y(turn), start[0])
     gap = axis_angle_from_quaternion(multiply(conjugate(q[-1]), start))
@@ -81,8 +87,8 @@ def blend(first: Motion, second: Motion, seconds: float) -> Motion:
     fade = round(seconds * first.fps) + 1
     if not (seconds > 0.0 and fade <= min(first.num_frames, second.resample(first.fps).num_frames)):
         raise InputError(
-            f"cannot blend {first.name!r} into {second.name!r} over {seconds} s; allowed is a time above 0 and "
-            f"at most the shorter motion, {min(first.duration, second.duration):.3f} s"
+            f"cannot blend {first.name!r} into {second.name!r} over {seconds} s; allowed is above 0 "
+            f"and at most the shorter motion, {min(first.duration, second.duration):.3f} s"
         )
     start = first.num_frames - fade
     other = placed(second.resample(first.fps), first, start)

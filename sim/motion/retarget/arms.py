@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from muslin.sim.body.model import BodyModel
 from muslin.sim.motion.motion import Motion
@@ -34,6 +35,8 @@ MAX_SPREAD = np.radians(30.0)
 
 _ROUNDS = 6
 _CHECKS_PER_SECOND = 30.0
+_BLOCK = 64  # frames skinned together
+_ABOVE = 0.5  # cosine to the normal: a point further off lies beside the part, over its edge
 _SHORTEST_LEVER = 0.1  # metres: about a shorter one a shoulder would have to turn far
 _EVERY = 3  # of the arm's vertices, a centimetre or so apart, are enough to see how deep it lies
 _UPPER_ARM_FROM = 0.5  # of the way from shoulder to elbow: above it, arm and chest are one flesh
@@ -42,10 +45,16 @@ _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip", "left
 
 @dataclass(frozen=True, eq=False)
 class ArmParts:
-    """vertices: arm vertices of one side (n,); faces: (F, 3) of trunk and thighs, in the body's indices."""
+    """vertices        (n,) arm vertices of one side, in the body's indices
+    surface         (m,) vertices of trunk and thighs, in the body's indices
+    faces           (F, 3) of trunk and thighs, in `surface`'s indices
+    faces_of_vertex (m, F) incidence, ones
+    """
 
     vertices: NDArray[np.intp]
-    faces: NDArray[np.int32]
+    surface: NDArray[np.int32]
+    faces: NDArray[np.intp]
+    faces_of_vertex: csr_array
 
 
 def arm_parts(body: BodyModel, side: str) -> ArmParts:
@@ -57,24 +66,31 @@ def arm_parts(body: BodyModel, side: str) -> ArmParts:
     lower = np.isin(part, [elbow, JOINT[f"{side}_wrist"], JOINT[f"{side}_hand"]])
     upper = (part == shoulder) & (along > _UPPER_ARM_FROM)
     trunk = np.isin(part, [JOINT[name] for name in _TRUNK])
-    return ArmParts(np.flatnonzero(lower | upper)[::_EVERY], body.faces[trunk[body.faces].all(axis=1)])
+    surface, faces = np.unique(body.faces[trunk[body.faces].all(axis=1)], return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    incidence = csr_array(
+        (np.ones(faces.size), (faces.ravel(), np.repeat(np.arange(len(faces)), 3))),
+        shape=(len(surface), len(faces)),
+    )
+    return ArmParts(np.flatnonzero(lower | upper)[::_EVERY], surface, faces, incidence)
 
 
 def clearances(vertices: Array, parts: ArmParts) -> tuple[Array, Array]:
-    """Signed distances (n,) of the arm's vertices to the trunk, inside negative, and outward directions (n, 3).
+    """Signed distances (n,) of the arm's vertices to the trunk, inside negative, and directions out (n, 3).
 
-    The trunk's surface is open at neck and shoulders; its generalised winding number still tells inside
-    from outside away from those holes.
+    d = n . (x - y) at the trunk vertex y nearest to x, n its normal, where x lies above or below it; beside
+    it, |x - y|. Good to a millimetre or two on a mesh of centimetre edges, and ten times as fast as exact.
     """
-    points = np.ascontiguousarray(vertices[parts.vertices])
-    used, faces = np.unique(parts.faces, return_inverse=True)
-    surface, faces = np.ascontiguousarray(vertices[used]), faces.reshape(-1, 3).astype(np.int64)
-    squared, _, nearest = igl.point_mesh_squared_distance(points, surface, faces)
-    inside = igl.fast_winding_number(surface, faces, points) > 0.5
-    sign = np.where(inside, -1.0, 1.0)
-    distance = np.sqrt(squared)
-    outward = (points - nearest) * (sign / np.maximum(distance, 1e-9))[:, None]
-    return sign * distance, outward
+    surface = vertices[parts.surface]
+    corners = surface[parts.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = parts.faces_of_vertex @ normals
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    points = vertices[parts.vertices]
+    apart, nearest = cKDTree(surface).query(points)
+    height = np.sum((points - surface[nearest]) * normals[nearest], axis=1)
+    above = np.abs(height) > _ABOVE * apart
+    return np.where(above, height, apart), normals[nearest]
 
 
 def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, float]]:
@@ -92,8 +108,7 @@ def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, floa
         changed = np.arange(0, motion.num_frames, max(round(motion.fps / _CHECKS_PER_SECOND), 1))
         checked, spread = changed, motion
         for round_number in range(_ROUNDS + 1):
-            for frame in changed:
-                need[frame], distance[frame] = _turn(spread, int(frame), body, parts, shoulder)
+            need[changed], distance[changed] = _turns(spread, changed, body, parts, shoulder)
             deepest = max(0.0, -float(distance[checked].min()))
             if round_number == 0:
                 figures["depth_before"] = max(figures["depth_before"], deepest)
@@ -108,22 +123,26 @@ def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, floa
     return motion, figures
 
 
-def _turn(
-    motion: Motion, frame: int, body: BodyModel, parts: ArmParts, shoulder: int
-) -> tuple[Array, float]:
-    """The turn (3,) the frame's deepest arm vertex asks for, in the collar's frame, and its distance."""
-    pose, translation = motion.poses[frame], motion.translations[frame]
-    vertices = body.vertices(None, pose, translation)
-    distance, outward = clearances(vertices, parts)
-    worst = int(np.argmin(distance))
-    if distance[worst] >= CLEARANCE:
-        return np.zeros(3), float(distance[worst])
-    pivot = forward_kinematics(pose, body.joint_template, translation)[shoulder]
-    axis = np.cross(vertices[parts.vertices[worst]] - pivot, outward[worst])
-    lever = float(np.linalg.norm(axis))
-    angle = np.arctan((CLEARANCE - distance[worst]) / max(lever, _SHORTEST_LEVER))
-    collar = conjugate(global_rotations(pose)[PARENTS[shoulder]])
-    return rotate(collar, axis / max(lever, 1e-9)) * angle, float(distance[worst])
+def _turns(
+    motion: Motion, frames: NDArray[np.intp], body: BodyModel, parts: ArmParts, shoulder: int
+) -> tuple[Array, Array]:
+    """Turns (n, 3) the frames' deepest arm vertices ask for, in the collar's frame, and their distances."""
+    poses, translations = motion.poses[frames], motion.translations[frames]
+    pivots = forward_kinematics(poses, body.joint_template, translations)[:, shoulder]
+    collars = conjugate(global_rotations(poses)[:, PARENTS[shoulder]])
+    turns, smallest = np.zeros((len(frames), 3)), np.empty(len(frames))
+    for start in range(0, len(frames), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        for k, vertices in enumerate(body.vertices(None, poses[block], translations[block]), start):
+            distance, outward = clearances(vertices, parts)
+            worst = int(np.argmin(distance))
+            smallest[k] = distance[worst]
+            if distance[worst] < CLEARANCE:
+                axis = np.cross(vertices[parts.vertices[worst]] - pivots[k], outward[worst])
+                lever = float(np.linalg.norm(axis))
+                angle = np.arctan((CLEARANCE - distance[worst]) / max(lever, _SHORTEST_LEVER))
+                turns[k] = rotate(collars[k], axis / max(lever, 1e-9)) * angle
+    return turns, smallest
 
 
 def _widened(turns: Array, fps: float) -> Array:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import binary_dilation, median_filter
 
 from muslin.sim.body.load import load_body
 from muslin.sim.body.model import BodyModel
@@ -25,14 +26,21 @@ from muslin.sim.motion.retarget.bvh import read_bvh
 from muslin.sim.motion.retarget.deepmimic import read_deepmimic
 from muslin.sim.motion.retarget.feet import clean_feet
 from muslin.sim.motion.retarget.onto_smpl import CMU, DEEPMIMIC, retarget
-from muslin.sim.motion.rotations import axis_angle_from_quaternion, heading, smooth
+from muslin.sim.motion.rotations import angular_speed, axis_angle_from_quaternion, heading, slerp, smooth
+from muslin.sim.motion.skeleton import JOINT
 from muslin.sim.motion.splicing import loop
 
-CMU_SOURCE = "CMU Graphics Lab Motion Capture Database, subject 1, trial {trial} (mocap.cs.cmu.edu), cgspeed BVH"
+CMU_SOURCE = "CMU Graphics Lab Motion Capture Database, subject 1, trial {trial} (mocap.cs.cmu.edu)"
 DEEPMIMIC_SOURCE = "DeepMimic motion clip {file} of pybullet 3.2.7"
 
-_LOW_PASS = 0.02  # seconds, standard deviation: keeps what moves a garment, drops marker noise (above 8 Hz)
-_NOISY_LOW_PASS = {"left_foot": 0.05, "right_foot": 0.05}
+LOW_PASS = 0.02
+"""Seconds, standard deviation: keeps what moves a garment, drops marker noise (above 8 Hz)."""
+TOE_LOW_PASS = 0.06
+"""Seconds: toe markers are the noisiest, and no garment feels toes."""
+LEAP = 5.0
+"""Radians per second."""
+HEAL = 0.08
+"""Seconds."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ def make(name: str, bvh: Path, deepmimic: Path, body: BodyModel) -> tuple[Motion
         motion = retarget(
             read_deepmimic(path, DEEPMIMIC_SOURCE.format(file=path.name)), DEEPMIMIC, body.joint_template
         )
-    motion = low_pass(motion).resample(recipe.fps)
+    motion = low_pass(heal(motion)).resample(recipe.fps)
     if recipe.loops > 1:
         motion = loop(motion, recipe.loops)
     motion, figures = spread_arms(motion, body)
@@ -91,18 +99,47 @@ def make(name: str, bvh: Path, deepmimic: Path, body: BodyModel) -> tuple[Motion
     motion = motion.moved(-float(heading(motion.quaternions[0, 0])))
     motion = motion.moved(0.0, -motion.pelvis[0] * np.array([1.0, 0.0, 1.0]))
     spread = np.degrees(max(figures["arm_spread_left"], figures["arm_spread_right"]))
-    did = f"retargeted onto body {body.name}, low-passed, feet cleaned, arms spread by up to {spread:.0f} degrees"
+    did = (
+        f"retargeted onto body {body.name}, smoothed, feet cleaned, arms spread by up to {spread:.0f} degrees"
+    )
     return motion._with(motion.poses, motion.translations, name=name, did=did), figures
 
 
+def heal(motion: Motion) -> Motion:
+    """Bridge leaps of single joints: steps much faster than what is around them, which no joint makes.
+
+    A step of a joint is a leap if it is above LEAP and four times the median speed within a quarter second.
+    The frames within HEAL seconds of it are replaced by the slerp across.
+    """
+    q = motion.quaternions.copy()
+    speed = angular_speed(q, motion.fps)
+    usual = median_filter(speed, size=(2 * round(0.25 * motion.fps) + 1, 1), mode="nearest")
+    reach = max(round(HEAL * motion.fps), 1)
+    leaps = np.pad((speed > LEAP) & (speed > 4.0 * usual), ((0, 1), (0, 0)))
+    for joint in range(24):
+        bad = binary_dilation(leaps[:, joint], iterations=reach)
+        good = np.flatnonzero(~bad)
+        if bad.any() and len(good) > 1:
+            frames = np.flatnonzero(bad)
+            after = np.clip(np.searchsorted(good, frames), 1, len(good) - 1)
+            start, end = good[after - 1], good[after]
+            weight = np.clip((frames - start) / (end - start), 0.0, 1.0)
+            q[frames, joint] = slerp(q[start, joint], q[end, joint], weight)
+    return motion._with(axis_angle_from_quaternion(q), motion.translations)
+
+
 def low_pass(motion: Motion) -> Motion:
-    """Gaussian low-pass of every rotation and of the path; the ends keep their place."""
-    q = smooth(motion.quaternions, _LOW_PASS * motion.fps)
+    """Gaussian low-pass of every joint's rotation, stronger for the toes."""
+    q = smooth(motion.quaternions, LOW_PASS * motion.fps)
+    toes = [JOINT["left_foot"], JOINT["right_foot"]]
+    q[:, toes] = smooth(q[:, toes], TOE_LOW_PASS * motion.fps)
     return motion._with(axis_angle_from_quaternion(q), motion.translations)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--bvh", type=Path, required=True)
     parser.add_argument("--deepmimic", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=ASSETS)
@@ -113,7 +150,8 @@ def main() -> None:
         motion, figures = make(name, arguments.bvh, arguments.deepmimic, body)
         write_amass(arguments.out / f"{name}.npz", motion)
         print(
-            f"{name}: {motion.num_frames} frames at {motion.fps:g} fps, joint speed {motion.max_joint_speed():.1f} rad/s, "
+            f"{name}: {motion.num_frames} frames at {motion.fps:g} fps, "
+            f"joint speed {motion.max_joint_speed():.1f} rad/s, "
             + ", ".join(f"{key} {value:.3f}" for key, value in figures.items()),
             flush=True,
         )

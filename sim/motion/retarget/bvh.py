@@ -42,7 +42,8 @@ def read_bvh(path: str | Path, source: str) -> SourceMotion:
             if channel.endswith("position"):
                 shift[:, axis] += values[:, column]
             else:
-                local = multiply(local, quaternion_from_axis_angle(np.radians(values[:, column, None]) * np.eye(3)[axis]))
+                turn = np.radians(values[:, column, None]) * np.eye(3)[axis]
+                local = multiply(local, quaternion_from_axis_angle(turn))
             column += 1
         if parent < 0:
             rotations[:, joint], positions[:, joint], rest[joint] = local, shift, offsets[joint]

@@ -9,7 +9,15 @@ import numpy as np
 
 from muslin.garments.errors import InputError
 from muslin.sim.motion.retarget.source import SourceMotion
-from muslin.sim.motion.rotations import about_y, aligned, conjugate, multiply, quaternion_from_axis_angle, rotate, slerp
+from muslin.sim.motion.rotations import (
+    about_y,
+    aligned,
+    conjugate,
+    multiply,
+    quaternion_from_axis_angle,
+    rotate,
+    slerp,
+)
 
 # name, parent, offset from the parent in metres (the URDF draws it four times as large, y up, facing +x,
 # right along +z), degrees of freedom: 4 a quaternion (w, x, y, z), 1 a hinge about +z, 0 fixed.
@@ -38,7 +46,7 @@ _FACE_Z = about_y(-0.5 * np.pi)  # +x (forward) becomes +z, +z (right) becomes -
 def read_deepmimic(path: str | Path, source: str, fps: float | None = None) -> SourceMotion:
     """Read a DeepMimic clip, at its own usual frame rate or resampled by slerp to `fps`.
 
-    Row: seconds until the next frame, root position (3), root quaternion, then the joints in `_JOINTS`' order.
+    Row: seconds until the next frame, root position (3), root quaternion, then `_JOINTS` in order.
     """
     path = Path(path)
     rows = np.array(json.loads(path.read_text(encoding="ascii"))["Frames"], dtype=np.float64)

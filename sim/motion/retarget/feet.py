@@ -35,7 +35,9 @@ def clean_feet(motion: Motion, body: BodyModel) -> Motion:
 
 def standing(motion: Motion, body: BodyModel, side: str) -> NDArray[np.bool_]:
     """(T,) whether the foot of `side` stands on the floor."""
-    ball = forward_kinematics(motion.poses, body.joint_template, motion.translations)[:, JOINT[f"{side}_foot"]]
+    ball = forward_kinematics(motion.poses, body.joint_template, motion.translations)[
+        :, JOINT[f"{side}_foot"]
+    ]
     velocity = np.gradient(gaussian_filter1d(ball, 0.02 * motion.fps, axis=0, mode="nearest"), axis=0)
     slow = np.linalg.norm(velocity, axis=1) * motion.fps < CONTACT_SPEED
     low = lowest_heights(motion, body, vertices=_sole(body, side)) < CONTACT_HEIGHT
@@ -52,7 +54,7 @@ def _pinned(motion: Motion, poses: Array, body: BodyModel, side: str) -> Array:
     frames = np.arange(motion.num_frames)
     known = {}
     for run in np.split(frames[stands], np.flatnonzero(np.diff(frames[stands]) > 1) + 1):
-        pin = np.median(ball[run], axis=0) if len(run) else None
+        pin = np.median(ball[run], axis=0) if len(run) else np.zeros(3)
         for frame in run:
             known[int(frame)] = np.array([pin[0] - ball[frame, 0], -low[frame], pin[2] - ball[frame, 2]])
     # Away from every contact the foot moves as captured.
@@ -62,7 +64,8 @@ def _pinned(motion: Motion, poses: Array, body: BodyModel, side: str) -> Array:
     if not known:
         return poses
     at = np.array(sorted(known))
-    offsets = np.stack([np.interp(frames, at, np.array([known[k] for k in at])[:, axis]) for axis in range(3)], axis=1)
+    values = np.array([known[int(frame)] for frame in at])
+    offsets = np.stack([np.interp(frames, at, values[:, axis]) for axis in range(3)], axis=1)
     offsets = gaussian_filter1d(offsets, 0.025 * motion.fps, axis=0, mode="nearest")
     offsets[:, 1] = np.maximum(offsets[:, 1], -low)
     ankle = joints[:, JOINT[f"{side}_ankle"]] + offsets
@@ -75,4 +78,6 @@ def _sole(body: BodyModel, side: str) -> NDArray[np.intp]:
 
 
 def _shifted(motion: Motion, lift: Array | float) -> Motion:
-    return motion._with(motion.poses, motion.translations + np.multiply.outer(lift, np.array([0.0, 1.0, 0.0])))
+    return motion._with(
+        motion.poses, motion.translations + np.multiply.outer(lift, np.array([0.0, 1.0, 0.0]))
+    )

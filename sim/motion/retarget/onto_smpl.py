@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from muslin.sim.motion.motion import Motion
 from muslin.sim.motion.retarget.source import SourceMotion
-from muslin.sim.motion.rotations import axis_angle_from_quaternion, between, conjugate, multiply, rotate, slerp
+from muslin.sim.motion.rotations import (
+    axis_angle_from_quaternion,
+    between,
+    conjugate,
+    multiply,
+    rotate,
+    slerp,
+)
 from muslin.sim.motion.skeleton import JOINT, JOINT_NAMES, PARENTS
 
 Array = NDArray[np.float64]
@@ -70,7 +77,8 @@ def retarget(source: SourceMotion, skeleton: Skeleton, rest_joints: ArrayLike) -
     arm = rest[[JOINT["left_hip"], JOINT["right_hip"]]].mean(axis=0) - rest[0]
     pelvis = middle - rotate(world[:, 0], arm)
     pelvis -= pelvis[0] * np.array([1.0, 0.0, 1.0])
-    return Motion(source.name, axis_angle_from_quaternion(local), pelvis - rest[0], source.fps, source.source, rest[0])
+    poses = axis_angle_from_quaternion(local)
+    return Motion(source.name, poses, pelvis - rest[0], source.fps, source.source, rest[0])
 
 
 def leg_length(joints: Array, hip: int, knee: int, ankle: int) -> float:
@@ -90,12 +98,18 @@ def _follow(part: Part, name: str, source: SourceMotion, rest: Array) -> Array:
     return multiply(rotation, between(own, theirs))
 
 
-def _both(side_parts: dict[str, tuple[str, tuple[str, str, str] | None]], sides: dict[str, str]) -> dict[str, Part]:
+_SideParts = dict[str, tuple[str, tuple[str, str, str] | None]]
+
+
+def _both(side_parts: _SideParts, sides: dict[str, str]) -> dict[str, Part]:
     """Parts of both body sides from a description with `*` for the side, in each skeleton's spelling."""
     parts = {}
     for ours, theirs in sides.items():
         for joint, (first, bone) in side_parts.items():
-            named = None if bone is None else (f"{ours}_{bone[0]}", bone[1].replace("*", theirs), bone[2].replace("*", theirs))
+            named = None
+            if bone is not None:
+                child, start, end = bone
+                named = (f"{ours}_{child}", start.replace("*", theirs), end.replace("*", theirs))
             parts[f"{ours}_{joint}"] = Part(first.replace("*", theirs), bone=named)
     return parts
 
