@@ -123,6 +123,12 @@ class ContactSystem:
         self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
         self._reserve_friction(8 * self.num_cloth)
 
+    def set_collider_area(self, vertices: NDArray[np.float64]) -> None:
+        """Take the areas that contacts are weighted by from the collider in this shape, (N, 3) metres."""
+        area = self.measure.vertex_area.numpy()
+        area[self.num_cloth :] = _vertex_areas(vertices, self.collider_faces)
+        self.measure.vertex_area.assign(area)
+
     def mask(self, face_on: NDArray[np.bool_]) -> None:
         """Switch collider faces on or off; edges and vertices follow the faces around them."""
         self.body_faces.on.assign(face_on.astype(np.int32))

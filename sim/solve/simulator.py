@@ -134,6 +134,28 @@ class ClothSimulator:
             raise
         return report
 
+    def force_residual(self, dt: float) -> float:
+        """Norm of the net force left on the cloth at rest, as a share of its weight.
+
+        Elastic, contact and gravity forces, and friction as it stood at the start of the last step of `dt` seconds;
+        no inertia.
+        """
+        saved = self.weight.numpy().copy()
+        self.weight.zero_()
+        self.remaining.zero_()
+        self._assemble(1.0 / dt)
+        self.weight.assign(saved)
+        force = np.linalg.norm(self.gradient.numpy())
+        return float(force / (self.cloth.mass.sum() * np.linalg.norm(self.settings.gravity) + 1e-300))
+
+    def set_gravity(self, gravity: tuple[float, float, float]) -> None:
+        """Acceleration of gravity from now on, m/s^2."""
+        self._gravity = wp.vec3d(*gravity)
+
+    def place(self, positions: NDArray[np.float64], collider_vertices: NDArray[np.float64]) -> None:
+        """Put cloth and collider somewhere else, at rest; they must not intersect there."""
+        self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
+
     def restore(self, x: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
         """Put the joint vertex array (V + N, 3) and the velocities back to a saved, intersection-free state."""
         self.x.assign(x)

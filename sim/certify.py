@@ -1,0 +1,40 @@
+"""The certificate of a sample, measured on the positions as they are stored."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from muslin.sim.cloth import ClothModel
+from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.intersections import count_intersections
+from muslin.sim.dataset.sample import Sample
+from muslin.sim.elastic import principal_stretches
+
+
+def certify(sample: Sample, cloth: ClothModel, base: Certificate) -> Sample:
+    """`sample` with `base` completed by intersections (ipctk), masked faces and strain of every frame."""
+    cloth_cloth = cloth_body = 0
+    stretch = 0.0
+    for frame in range(sample.num_frames):
+        positions = sample.positions[frame].astype(np.float64)
+        live = np.ones(len(sample.body_faces), bool)
+        live[sample.masked(frame)] = False
+        counts = count_intersections(
+            positions, sample.garment.faces, sample.body_vertices(frame), sample.body_faces[live]
+        )
+        cloth_cloth += counts.cloth_cloth
+        cloth_body += counts.cloth_body
+        stretch = max(stretch, float(principal_stretches(cloth, positions)[:, 0].max()))
+    masked = max((len(faces) for faces in sample.masked_faces), default=0)
+    return replace(
+        sample,
+        certificate=replace(
+            base,
+            cloth_cloth_intersections=cloth_cloth,
+            cloth_body_intersections=cloth_body,
+            masked_body_faces_max=masked,
+            largest_strain=stretch - 1.0,
+        ),
+    )

@@ -1,0 +1,110 @@
+"""Room for cloth where a body cuts into itself: armpits, elbows, crotch.
+
+Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the body
+there, and only there: a vertex whose surroundings along its outward normal are taken by another part of the body
+within `MASK_GAP_M` is drawn inwards,
+
+    s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
+
+g the gap and t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between them. The
+displacement is continuous in t: when limbs part, the collider turns back into the body and the cloth between them
+comes out on the right side. Faces of the body with a vertex so moved are the masked faces of the frame.
+"""
+
+import igl
+import numpy as np
+import scipy.sparse
+import warp as wp
+from numpy.typing import NDArray
+
+from muslin.sim.body.interior import masked_face_is_interior
+from muslin.sim.dataset.schema import MASK_GAP_M
+
+wp.set_module_options({"enable_backward": False})
+
+REACH = 0.08
+"""Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
+
+MAX_HITS = 12
+
+
+@wp.kernel
+def free_distance(
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    gap: float,
+    reach: float,
+    out: wp.array(dtype=float),
+):
+    """t of each vertex: free distance along its normal, minus the depth where it is inside; `reach` where free."""
+    i = wp.tid()
+    n = normals[i]
+    offset = float(1.0e-4)
+    origin = points[i] + n * offset
+    # The signed crossings of a ray from a point to infinity are the winding number there.
+    winding = float(0.0)
+    first = reach
+    travelled = float(0.0)
+    for _ in range(MAX_HITS):
+        hit = wp.mesh_query_ray(mesh, origin + n * travelled, n, 10.0)
+        if not hit.result:
+            break
+        if wp.dot(hit.normal, n) > 0.0:
+            winding += 1.0
+        else:
+            winding -= 1.0
+            if winding < 0.0 and first == reach:
+                first = travelled + hit.t
+        travelled += hit.t + offset
+    if winding > 0.5:
+        back = wp.mesh_query_ray(mesh, points[i] - n * offset, -n, reach)
+        # No other surface behind within reach: the count of crossings erred, or a limb passes right through.
+        depth = -reach
+        if back.result:
+            depth = back.t
+        out[i] = -depth
+    else:
+        out[i] = wp.min(first, reach)
+
+
+class SelfClearance:
+    """Turns a body into its collider, frame by frame. `faces` (M, 3) must bound a closed body."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int32], device: str) -> None:
+        self.faces = faces
+        self.device = device
+        self._points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device)
+        self._normals = wp.zeros(len(vertices), dtype=wp.vec3, device=device)
+        self._free = wp.zeros(len(vertices), dtype=float, device=device)
+        self._mesh = wp.Mesh(self._points, wp.array(faces.ravel(), dtype=wp.int32, device=device))
+        adjacency = igl.adjacency_matrix(faces.astype(np.int64)).astype(np.float64)
+        degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
+        self._average = degree @ adjacency
+
+    def collider(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices (N, 3) of the collider of a body in one pose, metres."""
+        normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
+        free = self._free_distance(vertices, normals)
+        gap = MASK_GAP_M
+        inwards = np.where(free < 0.0, 0.5 * gap - free, 0.5 * np.maximum(gap - free, 0.0))
+        moved = inwards > 0.0
+        if not moved.any():
+            return vertices
+        for _ in range(3):
+            inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
+        return vertices - inwards[:, None] * normals
+
+    def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Indices of the faces on which `collider` differs from the body and that do lie within it."""
+        moved = (vertices != collider).any(axis=1)
+        faces = np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
+        return faces[masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)] if len(faces) else faces
+
+    def _free_distance(self, vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        self._points.assign(vertices.astype(np.float32))
+        self._normals.assign(normals.astype(np.float32))
+        self._mesh.refit()
+        args = [self._mesh.id, self._points, self._normals, MASK_GAP_M, REACH, self._free]
+        wp.launch(free_distance, len(vertices), args, device=self.device)
+        return self._free.numpy().astype(np.float64)

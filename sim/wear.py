@@ -1,0 +1,100 @@
+"""A garment on a parametric body: dressing, changing shape and pose, following a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from muslin.garments.mesh import GarmentMesh
+from muslin.sim.body.model import BodyModel
+from muslin.sim.cloth import ClothModel
+from muslin.sim.contact.clearance import SelfClearance
+from muslin.sim.contact.system import ContactSettings
+from muslin.sim.dress import LEAST_GIRTH, grow_body, place, shrunk_body
+from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+
+Tick = Callable[[], None] | None
+
+MORPH_MOVE = 5.0e-3
+"""Largest move of a body vertex, metres, in one step of a change of shape or pose at rest."""
+
+REST_POSE = np.zeros((24, 3))
+
+
+def a_pose() -> NDArray[np.float64]:
+    """T-pose with the arms lowered by 45 degrees, 10 of them in the collar bones; (24, 3) axis-angle."""
+    theta = np.zeros((24, 3))
+    for collar, shoulder, sign in ((13, 16, -1.0), (14, 17, 1.0)):
+        theta[collar, 2] = sign * np.radians(10.0)
+        theta[shoulder, 2] = sign * np.radians(35.0)
+    return theta
+
+
+class WornGarment:
+    """A garment worn by a body of shape `beta` in pose `theta` at `translation`; starts dressed in the T-pose."""
+
+    def __init__(
+        self,
+        mesh: GarmentMesh,
+        cloth: ClothModel,
+        model: BodyModel,
+        beta: NDArray[np.float64],
+        contact: ContactSettings,
+        solver: SolverSettings,
+        device: str,
+        tick: Tick = None,
+    ) -> None:
+        self.model = model
+        self.beta = beta
+        self.theta = REST_POSE
+        self.translation = np.zeros(3)
+        body = model.vertices(beta, REST_POSE)
+        self.clearance = SelfClearance(body, model.faces, device)
+        start = place(mesh, model, beta, body)
+        bones = shrunk_body(model, beta, body, LEAST_GIRTH)
+        self.sim = ClothSimulator(cloth, start, bones, model.faces, contact, solver, device)
+        self.sim.contact.set_collider_area(body)
+        grow_body(self.sim, model, beta, self.clearance.collider(body), tick)
+
+    def body(self) -> NDArray[np.float64]:
+        """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces only."""
+        return self.model.vertices(self.beta, self.theta, self.translation)
+
+    def masked_faces(self) -> NDArray[np.int32]:
+        body = self.body()
+        return self.clearance.masked_faces(body, self.clearance.collider(body))
+
+    def carry(self, theta: NDArray[np.float64], translation: NDArray[np.float64]) -> None:
+        """Move body and garment together, as one rigid piece, to another root rotation and translation."""
+        old = self.model.transforms(self.beta, self.theta, self.translation)[0]
+        self.theta = np.concatenate([theta[:1], self.theta[1:]])
+        self.translation = translation
+        new = self.model.transforms(self.beta, self.theta, self.translation)[0]
+        change = new @ np.linalg.inv(old)
+        moved = [x @ change[:3, :3].T + change[:3, 3] for x in (self.sim.positions, self.sim.collider_vertices)]
+        self.sim.place(*moved)
+
+    def morph(self, beta: NDArray[np.float64], theta: NDArray[np.float64], tick: Tick = None) -> None:
+        """Change shape and pose at rest, in steps in which no body vertex moves more than `MORPH_MOVE`."""
+        begin = (self.beta, self.theta)
+        far = self.model.vertices(beta, theta, self.translation) - self.body()
+        steps = max(1, int(np.ceil(np.linalg.norm(far, axis=1).max() / MORPH_MOVE)))
+        for k in range(1, steps + 1):
+            share = k / steps
+            self.beta = (1.0 - share) * begin[0] + share * beta if k < steps else beta
+            self.theta = (1.0 - share) * begin[1] + share * theta if k < steps else theta
+            self.sim.advance(self.clearance.collider(self.body()), 1.0 / 30.0, inertia=False)
+            if tick is not None:
+                tick()
+
+    def follow(self, theta: NDArray[np.float64], translation: NDArray[np.float64], dt: float) -> None:
+        """One time step of `dt` seconds in which the body goes to a new pose."""
+        before = (self.theta, self.translation)
+        self.theta, self.translation = theta, translation
+        try:
+            self.sim.advance(self.clearance.collider(self.body()), dt)
+        except Exception:
+            self.theta, self.translation = before
+            raise
