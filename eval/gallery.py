@@ -1,0 +1,67 @@
+"""Pictures of a dataset's samples, drawn by several processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from muslin.sim.dataset import store
+from muslin.sim.dataset.sample import Sample
+from muslin.sim.view.lighting import DRAFT, FINE
+from muslin.sim.view.picture import picture, sample_camera
+
+DRAPE_SIZE = (390, 520)
+MOVIE_SIZE = (300, 400)
+
+Progress = Callable[[float, int, str], None]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture to draw: a frame of a sample; with `frames` by one camera that holds them all."""
+
+    root: Path
+    sample_id: str
+    frame: int = 0
+    frames: tuple[int, ...] = ()
+
+
+def draw(
+    shots: Sequence[Shot], workers: int | None = None, progress: Progress | None = None
+) -> list[np.ndarray]:
+    """Pictures in the order of the shots; by default one process a usable core."""
+    count = min(workers or len(os.sched_getaffinity(0)), max(1, len(shots) // 4))
+    pictures: list[np.ndarray] = []
+    for done, image in enumerate(_drawn(shots, count), start=1):
+        pictures.append(image)
+        if progress is not None:
+            progress(done, len(shots), shots[done - 1].sample_id)
+    return pictures
+
+
+def _drawn(shots: Sequence[Shot], workers: int) -> Iterator[np.ndarray]:
+    if workers <= 1:
+        yield from map(_draw, shots)
+        return
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(_draw, shots, chunksize=2)
+
+
+def _draw(shot: Shot) -> np.ndarray:
+    sample = _sample(shot.root, shot.sample_id)
+    if not shot.frames:
+        return picture(sample, shot.frame, DRAPE_SIZE, quality=FINE)
+    camera, ground = sample_camera(sample, shot.frames, MOVIE_SIZE)
+    return picture(sample, shot.frame, MOVIE_SIZE, quality=DRAFT, camera=camera, ground=ground)
+
+
+@lru_cache(maxsize=2)
+def _sample(root: Path, sample_id: str) -> Sample:
+    return store.read_sample(root, sample_id)
