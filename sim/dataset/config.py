@@ -5,7 +5,7 @@ seed = 0
 kind = "both"                                   # "drape", "sequence" or "both"
 
 [scene]                                         # what all samples share; the keys of a scene file
-garment = { design = "tee", resolution = 1400 }
+garment = { design = "tee", template = 1400 }
 body = { model = "female" }
 
 [[designs]]                                     # one garment

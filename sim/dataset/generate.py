@@ -61,7 +61,7 @@ def generate(
 
     workers      processes; by default one a usable core on the CPU, one on a GPU
     simulate     `muslin.sim.run.simulate_chain` unless given
-    make_scene   what turns the values of a scene file into a scene; `Scene.model_validate` unless given
+    make_scene   from the values of a scene file to a scene; `muslin.sim.scene.parse_scene` unless given
 
     A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a
     scene that cannot be, for a folder that may not be written to (see `prepare_root`), and when a process
@@ -118,17 +118,16 @@ def _scenes(planned: Plan, make_scene: Callable[[dict[str, Any]], Any]) -> list[
         for job in chain.jobs:
             try:
                 made.append(make_scene(job.scene))
-            except ValueError as error:  # pydantic's ValidationError is one
-                lines = "; ".join(line.strip() for line in str(error).splitlines() if line.strip())
-                raise InputError(f"scene of sample {job.id}: {lines}") from error
+            except (InputError, ValueError) as error:
+                raise InputError(f"scene of sample {job.id}: {error}") from error
         scenes.append(made)
     return scenes
 
 
 def _default_make_scene() -> Callable[[dict[str, Any]], Any]:
-    from muslin.sim.scene import Scene
+    from muslin.sim.scene import parse_scene
 
-    return Scene.model_validate
+    return parse_scene
 
 
 def _silent(done: float, total: int, message: str) -> None:

@@ -17,6 +17,7 @@ import ipctk
 import numpy as np
 
 from muslin.garments.errors import InputError
+from muslin.sim.body.interior import masked_face_is_interior
 from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.header import read_header
 from muslin.sim.dataset.index import in_plan_order, listed_ids
@@ -158,8 +159,6 @@ def _check_frame(sample: Sample, frame: int, masked: np.ndarray) -> tuple[tuple[
     if counts.cloth_body:
         reasons.append(f"{counts.cloth_body} cloth-body intersections")
     if masked.size:
-        from muslin.sim.body.interior import masked_face_is_interior
-
         outside = int(np.count_nonzero(~masked_face_is_interior(body, faces, masked, MASK_GAP_M)))
         if outside:
             reasons.append(f"{outside} of {len(masked)} masked body faces do not lie inside the body")

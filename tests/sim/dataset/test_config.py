@@ -16,7 +16,7 @@ seed = 3
 
 [scene]
 fabric = "denim"
-garment = { design = "tee", resolution = 400 }
+garment = { design = "tee", template = 400 }
 body = { model = "female" }
 
 [[designs]]
@@ -52,7 +52,7 @@ def test_the_demo_is_ten_drapes_and_a_sequence(demo: Path) -> None:
     assert {job.split for job in planned.jobs if job.labels["design"] == "long_dress"} == {"test"}
     drape, clip = planned.chains[0].jobs[0], planned.chains[1].jobs[0]
     assert drape.scene["body"] == {"model": "female", "beta": [-2.0]}
-    assert drape.scene["garment"]["resolution"] == 400
+    assert drape.scene["garment"]["template"] == 400
     assert "motion" not in drape.scene
     assert clip.scene["motion"] == {"clip": "cmu_07_01", "start": 0.0, "fps": 30.0, "end": 4.0}
 

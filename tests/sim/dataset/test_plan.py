@@ -93,10 +93,10 @@ def test_long_lists_of_shapes_are_cut_into_chains() -> None:
     assert [len(chain.jobs) for chain in result.chains] == [3, 3, 1]
 
 
-def test_a_design_replaces_the_garment_of_the_scene_but_not_its_resolution() -> None:
-    scene = {"garment": {"mesh": "x.obj", "parameters": {"sleeve_length": 9.0}, "resolution": 400}}
+def test_a_design_replaces_the_garment_of_the_scene_but_not_its_mesh_size() -> None:
+    scene = {"garment": {"mesh": "x.obj", "parameters": {"sleeve_length": 9.0}, "template": 400}}
     (job,) = planned(scene=scene, designs=[{"preset": "top"}]).jobs
-    assert job.scene["garment"].keys() == {"design", "parameters", "resolution"}
+    assert job.scene["garment"].keys() == {"design", "parameters", "template"}
     assert planned(scene=scene).jobs[0].scene["garment"] == scene["garment"]
 
 
