@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
 from muslin.garments.errors import InputError
+from muslin.garments.obj_reader import read_obj
 
 MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
 
@@ -32,7 +32,9 @@ def read_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a mesh ({', '.join(MESH_SUFFIXES)})")
     if path.suffix.lower() == ".obj":
-        vertices, faces = _read_obj(path)
+        # trimesh would split vertices along uv seams
+        content = read_obj(path)
+        vertices, faces = content.vertices, content.faces
     elif path.suffix.lower() in MESH_SUFFIXES:
         vertices, faces = _read_other(path)
     else:
@@ -65,29 +67,6 @@ def check_mesh(vertices: np.ndarray, faces: np.ndarray, name: str) -> None:
             f"{name}: not manifold: the edge of vertices {a} and {b} has {count.max()} faces, at most 2 are "
             "allowed; split the mesh there"
         )
-
-
-def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """`v` and `f` lines only: other readers split vertices along uv seams. Polygons become fans."""
-    vertices: list[list[float]] = []
-    faces: list[tuple[int, int, int]] = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, line in enumerate(lines, start=1):
-            words = line.split()
-            try:
-                if words[:1] == ["v"]:
-                    vertices.append([float(word) for word in words[1:4]])
-                    if len(words) < 4:
-                        raise ValueError("three coordinates are needed")
-                elif words[:1] == ["f"]:
-                    corners = [int(word.split("/")[0]) for word in words[1:]]
-                    if len(corners) < 3 or 0 in corners:
-                        raise ValueError("three vertices or more, counted from 1, are needed")
-                    index = [c - 1 if c > 0 else len(vertices) + c for c in corners]
-                    faces += [(index[0], b, c) for b, c in pairwise(index[1:])]
-            except ValueError as error:
-                raise InputError(f"{path}: line {number}: {line.strip()!r} is not OBJ ({error})") from error
-    return np.array(vertices, dtype=np.float64).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
 
 
 def _read_other(path: Path) -> tuple[np.ndarray, np.ndarray]:

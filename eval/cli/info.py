@@ -1,0 +1,45 @@
+"""`muslin info`: what a dataset holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def info(
+    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    samples: Annotated[bool, typer.Option("--samples", help="List the samples too.")] = False,
+) -> None:
+    """Tell what a dataset holds: counts, splits, worst certificate, size, time.
+
+    \b
+    Examples:
+      muslin info out/demo
+      muslin info out/demo --samples
+      muslin info out/demo --json
+    """
+    from muslin.sim.dataset.info import info as summarise
+    from muslin.sim.dataset.reader import open_dataset
+
+    facts = summarise(dataset).to_dict()
+    rows = open_dataset(dataset).rows if samples else ()
+    if as_json:
+        typer.echo(json.dumps(facts | ({"rows": list(rows)} if samples else {}), indent=1))
+        return
+    for key, value in facts.items():
+        typer.echo(f"{key.replace('_', ' '):18} {_text(value)}")
+    for row in rows:
+        about = " ".join(str(row[key]) for key in ("design", "shape", "sequence", "fabric") if row[key])
+        typer.echo(f"  {row['id']}  {row['kind']:8} {row['frames']:5} frames  {about}")
+
+
+def _text(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_text(entry)}" for key, entry in value.items()) or "none"
+    if isinstance(value, (tuple, list)):
+        return " to ".join(map(_text, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

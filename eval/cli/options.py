@@ -1,0 +1,60 @@
+"""Options that several commands share, and the checks on them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from muslin.garments.errors import InputError
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change a key of the file, e.g. --set seed=3. Repeatable."
+    ),
+]
+Device = Annotated[str, typer.Option("--device", help="cpu, or cuda:0 (cuda:1 …).")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes; by default one a processor core.")
+]
+SampleId = Annotated[
+    str | None, typer.Option("--sample", metavar="ID", help="The sample; see `muslin info DIR --samples`.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the output if it is there.")]
+
+
+def check_device(device: str) -> str:
+    """Raise InputError unless the name is one of a device."""
+    if not re.fullmatch(r"cpu|cuda(:\d+)?", device):
+        raise InputError(f"--device {device!r} is not allowed; it must be cpu or cuda:0 (cuda:1 …)")
+    return "cuda:0" if device == "cuda" else device
+
+
+def check_new(path: Path, force: bool = False) -> Path:
+    """Raise InputError if a file is there already (unless forced), or its folder cannot be made."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file")
+    if path.exists() and not force:
+        raise InputError(f"{path} is there already; give another name, or --force to replace it")
+    return make_parent(path)
+
+
+def make_parent(path: Path) -> Path:
+    """Make the folder that a file is to lie in. Raises InputError if that cannot be."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path.parent}: cannot be made ({error.strerror}); choose another place") from error
+    return path
+
+
+def check_empty_folder(path: Path) -> Path:
+    """Raise InputError if a folder for new output holds anything."""
+    if path.is_file() or (path.is_dir() and any(path.iterdir())):
+        raise InputError(f"{path} is not an empty folder; give a new one: nothing there is touched")
+    return path

@@ -1,0 +1,46 @@
+"""`muslin simulate`: one scene to one sample."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from muslin.eval.cli.options import Device, Overrides, check_device, check_empty_folder
+
+
+def simulate(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder for the sample.")],
+    overrides: Overrides = None,
+    device: Device = "cpu",
+) -> None:
+    """Simulate one scene and store it, with its certificate, as a dataset of one sample.
+
+    \b
+    Examples:
+      muslin simulate scenes/tshirt_walk.toml --out out/walk
+      muslin simulate scenes/cloth_on_sphere.toml --out out/sphere --set garment.resolution=1400
+      muslin simulate scenes/dress_dance.toml --out out/dance --device cuda:0
+    """
+    from muslin.sim.scene import load_scene
+
+    check_empty_folder(out)
+    loaded = load_scene(scene, overrides or [])
+    name = check_device(device)
+
+    from muslin.sim.dataset.progress_bar import progress_bar
+    from muslin.sim.dataset.reader import write_dataset
+    from muslin.sim.run import simulate as run
+
+    with progress_bar("simulate") as update:
+        sample = run(loaded, name, lambda done, total: update(done, total, ""))
+    write_dataset(out, [sample], config=loaded.model_dump(mode="json"))
+    found = sample.certificate
+    typer.echo(
+        f"{out}: {sample.kind} {sample.id}, {sample.num_frames} frames, "
+        f"{sample.garment.num_vertices} vertices, "
+        f"{found.cloth_cloth_intersections} cloth-cloth and {found.cloth_body_intersections} cloth-body "
+        f"intersections, {found.seconds:.1f} s"
+    )

@@ -1,0 +1,31 @@
+"""`muslin view`: look at a sample in a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from muslin.eval.cli.options import SampleId
+from muslin.garments.errors import InputError
+
+
+def view(
+    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")], sample_id: SampleId = None
+) -> None:
+    """Open a window with a sample (the first, unless told): turn it with the mouse, slide through its frames.
+
+    \b
+    Examples:
+      muslin view out/demo
+      muslin view out/demo --sample ID
+    """
+    from muslin.sim.dataset.reader import open_dataset
+    from muslin.sim.view.window import require_display, show
+
+    data = open_dataset(dataset)
+    if not len(data):
+        raise InputError(f"{dataset}: the dataset holds no sample; run `muslin generate` first")
+    require_display()
+    show(data[sample_id or 0])
