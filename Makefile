@@ -26,8 +26,8 @@ help:
 
 demo: $(VENV)/installed-core
 	$(BIN)/muslin generate scenes/demo.toml --out out/demo/dataset --workers 2
-	$(BIN)/muslin verify out/demo/dataset
-	$(BIN)/muslin report out/demo/dataset --html out/demo/report.html
+	$(BIN)/muslin verify out/demo/dataset --json out/demo/verified.json
+	$(BIN)/muslin report out/demo/dataset --verification out/demo/verified.json --html out/demo/report.html
 
 # Processes that start with a cold kernel cache would each compile every kernel: one compiles first.
 test: $(VENV)/installed-dev
