@@ -91,9 +91,10 @@ def _arrays(path: Path) -> dict[str, NDArray]:
     if not path.is_file():
         raise InputError(f"{path}: no such motion file; {_ALLOWED}")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise InputError(f"{path}: a single array, not a motion; {_ALLOWED}")
+        loaded = np.load(path, allow_pickle=False)
+        if not isinstance(loaded, np.lib.npyio.NpzFile):
+            raise InputError(f"{path}: a single array, not a motion; {_ALLOWED}")
+        with loaded as file:
             wanted = {"poses", "root_orient", "pose_body", "trans", "source", *_FRAME_RATES} & set(file.files)
             _check_kind(path, set(file.files))
             return {key: file[key] for key in wanted}

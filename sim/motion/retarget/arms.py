@@ -37,6 +37,7 @@ _ROUNDS = 6
 _CHECKS_PER_SECOND = 30.0
 _BLOCK = 64  # frames skinned together
 _ABOVE = 0.5  # cosine to the normal: a point further off lies beside the part, over its edge
+_DEEPEST = 0.12  # metres: no arm is deeper inside a trunk
 _SHORTEST_LEVER = 0.1  # metres: about a shorter one a shoulder would have to turn far
 _EVERY = 3  # of the arm's vertices, a centimetre or so apart, are enough to see how deep it lies
 _UPPER_ARM_FROM = 0.5  # of the way from shoulder to elbow: above it, arm and chest are one flesh
@@ -49,12 +50,14 @@ class ArmParts:
     surface         (m,) vertices of trunk and thighs, in the body's indices
     faces           (F, 3) of trunk and thighs, in `surface`'s indices
     faces_of_vertex (m, F) incidence, ones
+    rim             (m,) whether a vertex is on the rim of the holes at neck, shoulders and shins
     """
 
     vertices: NDArray[np.intp]
     surface: NDArray[np.int32]
     faces: NDArray[np.intp]
     faces_of_vertex: csr_array
+    rim: NDArray[np.bool_]
 
 
 def arm_parts(body: BodyModel, side: str) -> ArmParts:
@@ -72,7 +75,18 @@ def arm_parts(body: BodyModel, side: str) -> ArmParts:
         (np.ones(faces.size), (faces.ravel(), np.repeat(np.arange(len(faces)), 3))),
         shape=(len(surface), len(faces)),
     )
-    return ArmParts(np.flatnonzero(lower | upper)[::_EVERY], surface, faces, incidence)
+    return ArmParts(
+        np.flatnonzero(lower | upper)[::_EVERY], surface, faces, incidence, _rim(faces, len(surface))
+    )
+
+
+def _rim(faces: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
+    """(count,) whether each vertex is on an edge of one triangle only."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, uses = np.unique(edges, axis=0, return_counts=True)
+    rim = np.zeros(count, dtype=bool)
+    rim[edges[uses == 1]] = True
+    return rim
 
 
 def clearances(vertices: Array, parts: ArmParts) -> tuple[Array, Array]:
@@ -89,7 +103,8 @@ def clearances(vertices: Array, parts: ArmParts) -> tuple[Array, Array]:
     points = vertices[parts.vertices]
     apart, nearest = cKDTree(surface).query(points)
     height = np.sum((points - surface[nearest]) * normals[nearest], axis=1)
-    above = np.abs(height) > _ABOVE * apart
+    # Nearest to a rim means past a hole, and far below the surface means on its other side: both are outside.
+    above = (np.abs(height) > _ABOVE * apart) & ~parts.rim[nearest] & (apart < _DEEPEST)
     return np.where(above, height, apart), normals[nearest]
 
 

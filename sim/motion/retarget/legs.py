@@ -10,7 +10,6 @@ from muslin.sim.motion.rotations import (
     between,
     conjugate,
     multiply,
-    quaternion_from_axis_angle,
     rotate,
 )
 from muslin.sim.motion.skeleton import JOINT, forward_kinematics, global_rotations
@@ -39,11 +38,13 @@ def reach(poses: Array, translations: Array, rest_joints: ArrayLike, side: str, 
     sideways = rotate(world[:, 0], np.array([1.0, 0.0, 0.0]))
     # A straight leg bends about the body's own sideways axis, knee forward.
     axis += 1e-3 * (upper * lower)[:, None] * sideways
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    now = np.arctan2(np.sum(np.cross(thigh, shin) * axis, axis=1), np.sum(thigh * shin, axis=1))
-    new = np.arccos(np.clip((length**2 - upper**2 - lower**2) / (2 * upper * lower), -1.0, 1.0))
-    bend = quaternion_from_axis_angle((new - now)[:, None] * axis)
-    swing = between(hip + thigh + rotate(bend, shin) - hip, wanted)
+    down = thigh / upper[:, None]
+    back = np.cross(axis, down)
+    back /= np.linalg.norm(back, axis=1, keepdims=True)
+    cosine = ((length**2 - upper**2 - lower**2) / (2 * upper * lower))[:, None]
+    new_shin = lower[:, None] * (cosine * down + np.sqrt(1.0 - cosine**2) * back)
+    bend = between(shin, new_shin)
+    swing = between(thigh + new_shin, wanted)
 
     new_hip = multiply(swing, world[:, hip_j])
     new_knee = multiply(swing, multiply(bend, world[:, knee_j]))
