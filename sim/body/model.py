@@ -182,20 +182,23 @@ class BodyModel:
         return rest, rotations, positions
 
     def _checked_beta(self, beta: ArrayLike | None) -> Floats:
-        values = np.zeros(self.num_betas) if beta is None else np.asarray(beta, dtype=np.float64)
-        if values.ndim == 0 or values.shape[-1] > self.num_betas:
+        given = np.zeros(self.num_betas) if beta is None else np.asarray(beta, dtype=np.float64)
+        if given.ndim == 0 or given.shape[-1] > self.num_betas:
             raise InputError(
-                f"beta has shape {values.shape}; body '{self.name}' takes (..., n) with n <= {self.num_betas}"
+                f"beta has shape {given.shape}; body '{self.name}' takes (..., n) with n <= {self.num_betas}"
             )
-        if not np.isfinite(values).all():
+        if not np.isfinite(given).all():
             raise InputError(
                 "beta holds NaN or infinity; give finite standard deviations, usually in [-3, 3]"
             )
+        values = np.zeros((*given.shape[:-1], self.num_betas))
+        values[..., : given.shape[-1]] = given
         return values
 
 
 def _times_beta(directions: Floats, beta: Floats) -> Floats:
-    rows = directions[..., : beta.shape[-1]].reshape(-1, beta.shape[-1])
+    """directions (..., B) times beta (..., B), the leading dimensions of beta first."""
+    rows = directions.reshape(-1, beta.shape[-1])
     return (beta @ rows.T).reshape(*beta.shape[:-1], *directions.shape[:-1])
 
 

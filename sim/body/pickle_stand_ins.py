@@ -137,6 +137,8 @@ def _encode(text: str, encoding: str = "latin1") -> bytes:
 
 
 _CONSTRUCT, _SET = Function(_construct), Function(lambda items=(): set(items))
+# the buffer of an empty array, in Python 3's pickles of old protocols
+_EMPTY = Function(lambda: b"")
 _NUMPY_CORE = ("numpy.core", "numpy._core")
 
 # (module, name) as a pickle writes them, in Python 2's and Python 3's spelling.
@@ -154,6 +156,7 @@ ALLOWED: dict[tuple[str, str], Any] = {
     **{(module, "_reconstructor"): _CONSTRUCT for module in ("copy_reg", "copyreg")},
     **{(module, "object"): Object for module in ("__builtin__", "builtins")},
     **{(module, "set"): _SET for module in ("__builtin__", "builtins")},
+    **{(module, "bytes"): _EMPTY for module in ("__builtin__", "builtins")},
     ("_codecs", "encode"): Function(_encode),
 }
 

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from muslin.sim.body.joints import PARENTS
+
 Floats = NDArray[np.float64]
 
 NUM_BETAS = 10
-REGRESSOR_CANDIDATES = 150
+CANDIDATES_PER_OCTANT = 20
+REGRESSOR_BODIES = 200
 
 
 @dataclass(frozen=True)
@@ -70,24 +73,32 @@ def fit_shape_space(vertices: NDArray[np.floating], joints: Floats, faces: NDArr
 def fit_joint_regressor(vertices: NDArray[np.floating], joints: Floats, weights: Floats) -> Floats:
     """A sparse non-negative regressor (24, V), rows sum to one, J = regressor @ v, as in SMPL's files.
 
-    Each joint is fitted to the vertices nearest to it among those it moves. It serves programs that know only
-    SMPL's form; the affine joints are the accurate ones.
+    Each joint is fitted to vertices all around it, near ones moved by it or by its parent. It serves programs
+    that know only SMPL's form; the affine joints are the accurate ones.
     """
     regressor = np.zeros((joints.shape[1], vertices.shape[1]))
     mean = vertices.mean(axis=0)
-    subset = vertices[:: max(1, len(vertices) // 200)]
-    targets = joints[:: max(1, len(joints) // 200)]
+    stride = max(1, len(vertices) // REGRESSOR_BODIES)
+    bodies, targets = vertices[::stride].astype(np.float64), joints[::stride]
     for joint in range(joints.shape[1]):
-        distance = np.linalg.norm(mean - joints[:, joint].mean(axis=0), axis=1)
-        distance[weights[:, joint] < 1e-3] = np.inf
-        near = np.argsort(distance)[:REGRESSOR_CANDIDATES]
-        near = near[np.isfinite(distance[near])]
-        system = subset[:, near].transpose(0, 2, 1).reshape(-1, len(near)).astype(np.float64)
+        near = _candidates(mean - joints[:, joint].mean(axis=0), weights[:, [joint, max(PARENTS[joint], 0)]])
+        system = bodies[:, near].transpose(0, 2, 1).reshape(-1, len(near))
         # a heavy last row asks for weights that sum to one
         system = np.vstack([system, np.full(len(near), 1e3)])
-        solution, _ = nnls(system, np.append(targets[:, joint].ravel(), 1e3), maxiter=50 * len(near))
+        solution, _ = nnls(system, np.append(targets[:, joint].ravel(), 1e3), maxiter=100 * len(near))
         regressor[joint, near] = solution / solution.sum()
     return regressor
+
+
+def _candidates(offsets: Floats, weights: Floats) -> NDArray[np.int64]:
+    """The vertices nearest to the origin of `offsets` (V, 3) in each octant, of those with any weight."""
+    distance = np.where(weights.max(axis=1) > 1e-3, np.linalg.norm(offsets, axis=1), np.inf)
+    octants = (offsets > 0.0) @ np.array([1, 2, 4])
+    chosen = []
+    for octant in range(8):
+        members = np.flatnonzero((octants == octant) & np.isfinite(distance))
+        chosen.append(members[np.argsort(distance[members])[:CANDIDATES_PER_OCTANT]])
+    return np.concatenate(chosen)
 
 
 def volume(vertices: Floats, faces: NDArray[np.int32]) -> float:
