@@ -1,6 +1,7 @@
 """Motion clips of AMASS form: load, resample, mirror, splice, and make new ones from seen poses."""
 
 from muslin.sim.motion.amass import read_amass, write_amass
+from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import load_motion, motion_names
 from muslin.sim.motion.grounding import fit_to_body
 from muslin.sim.motion.lead_in import lead_in
@@ -20,6 +21,7 @@ __all__ = [
     "motion_names",
     "random_walk",
     "read_amass",
+    "spread_arms",
     "time_warp",
     "write_amass",
 ]

@@ -41,7 +41,7 @@ def fit_to_body(motion: Motion, body: BodyModel, beta: ArrayLike | None = None) 
     lows = lowest_heights(moved, body, beta)
     floor = float(np.quantile(lows, FLOOR_QUANTILE))
     lift = lift_above_floor(lows - floor, motion.fps)
-    return moved._with(
+    return moved.with_frames(
         moved.poses,
         moved.translations + np.stack([np.zeros_like(lift), lift - floor, np.zeros_like(lift)], axis=1),
         did=f"grounded for body {body.name}",

@@ -132,7 +132,9 @@ class Motion:
             return self
         frames = int(np.floor(self.duration * fps + _FRAME_SLACK)) + 1
         poses, translations = self.at(np.arange(frames) / fps)
-        return self._with(poses, translations, fps=fps, did=f"resampled from {self.fps:g} to {fps:g} fps")
+        return self.with_frames(
+            poses, translations, fps=fps, did=f"resampled from {self.fps:g} to {fps:g} fps"
+        )
 
     def clip(self, start: float, end: float) -> Motion:
         """The frames from `start` to `end` seconds, both included."""
@@ -149,7 +151,9 @@ class Motion:
                 f"widen the range to at least one frame"
             )
         keep = slice(first, last + 1)
-        return self._with(self.poses[keep], self.translations[keep], did=f"clipped to {start:g}-{end:g} s")
+        return self.with_frames(
+            self.poses[keep], self.translations[keep], did=f"clipped to {start:g}-{end:g} s"
+        )
 
     def mirror(self) -> Motion:
         """Left and right exchanged: the reflection x -> -x of space.
@@ -159,7 +163,7 @@ class Motion:
         """
         poses = self.poses[:, list(MIRRORED)] * np.array([1.0, -1.0, -1.0])
         translations = self.pelvis * np.array([-1.0, 1.0, 1.0]) - self.rest_pelvis
-        return self._with(poses, translations, name=f"{self.name}_mirrored", did="mirrored")
+        return self.with_frames(poses, translations, name=f"{self.name}_mirrored", did="mirrored")
 
     def moved(self, turn: float = 0.0, shift: ArrayLike = (0.0, 0.0, 0.0)) -> Motion:
         """Turned about the world's vertical axis by `turn` radians, then shifted by `shift` (3,) metres."""
@@ -167,9 +171,9 @@ class Motion:
         poses = self.poses.copy()
         poses[:, 0] = axis_angle_from_quaternion(multiply(half, self.quaternions[:, 0]))
         pelvis = rotate(half, self.pelvis) + np.asarray(shift, dtype=np.float64)
-        return self._with(poses, pelvis - self.rest_pelvis)
+        return self.with_frames(poses, pelvis - self.rest_pelvis)
 
-    def _with(
+    def with_frames(
         self,
         poses: Array,
         translations: Array,

@@ -71,7 +71,7 @@ def loop(motion: Motion, count: int, seam: float = 0.25) -> Motion:
         end = rotate(about_y(turned), pelvis[-1]) + shift
         turned += turn
         shift = (end - rotate(about_y(turned), pelvis[0])) * _HORIZONTAL
-    return motion._with(
+    return motion.with_frames(
         axis_angle_from_quaternion(np.concatenate(poses)),
         np.concatenate(places) - motion.rest_pelvis,
         did=f"looped {count} times",

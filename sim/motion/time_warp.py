@@ -28,4 +28,4 @@ def time_warp(motion: Motion, strength: float, seed: int, period: float = 1.0) -
     read = np.concatenate([[0.0], np.cumsum(speed[:-1]) / motion.fps])
     poses, translations = motion.at(read[read <= motion.duration + 1e-9])
     did = f"time-warped by {strength:g} (seed {seed}, period {period:g} s)"
-    return motion._with(poses, translations, did=did)
+    return motion.with_frames(poses, translations, did=did)

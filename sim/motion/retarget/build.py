@@ -19,9 +19,9 @@ from scipy.ndimage import binary_dilation, median_filter
 from muslin.sim.body.load import load_body
 from muslin.sim.body.model import BodyModel
 from muslin.sim.motion.amass import write_amass
+from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import ASSETS
 from muslin.sim.motion.motion import Motion
-from muslin.sim.motion.retarget.arms import spread_arms
 from muslin.sim.motion.retarget.bvh import read_bvh
 from muslin.sim.motion.retarget.deepmimic import read_deepmimic
 from muslin.sim.motion.retarget.feet import clean_feet
@@ -102,7 +102,7 @@ def make(name: str, bvh: Path, deepmimic: Path, body: BodyModel) -> tuple[Motion
     did = (
         f"retargeted onto body {body.name}, smoothed, feet cleaned, arms spread by up to {spread:.0f} degrees"
     )
-    return motion._with(motion.poses, motion.translations, name=name, did=did), figures
+    return motion.with_frames(motion.poses, motion.translations, name=name, did=did), figures
 
 
 def heal(motion: Motion) -> Motion:
@@ -125,7 +125,7 @@ def heal(motion: Motion) -> Motion:
             start, end = good[after - 1], good[after]
             weight = np.clip((frames - start) / (end - start), 0.0, 1.0)
             q[frames, joint] = slerp(q[start, joint], q[end, joint], weight)
-    return motion._with(axis_angle_from_quaternion(q), motion.translations)
+    return motion.with_frames(axis_angle_from_quaternion(q), motion.translations)
 
 
 def low_pass(motion: Motion) -> Motion:
@@ -133,7 +133,7 @@ def low_pass(motion: Motion) -> Motion:
     q = smooth(motion.quaternions, LOW_PASS * motion.fps)
     toes = [JOINT["left_foot"], JOINT["right_foot"]]
     q[:, toes] = smooth(q[:, toes], TOE_LOW_PASS * motion.fps)
-    return motion._with(axis_angle_from_quaternion(q), motion.translations)
+    return motion.with_frames(axis_angle_from_quaternion(q), motion.translations)
 
 
 def main() -> None:

@@ -28,7 +28,7 @@ def clean_feet(motion: Motion, body: BodyModel) -> Motion:
     poses = motion.poses.copy()
     for side in ("left", "right"):
         poses = _pinned(motion, poses, body, side)
-    motion = motion._with(poses, motion.translations)
+    motion = motion.with_frames(poses, motion.translations)
     lift = lift_above_floor(lowest_heights(motion, body), motion.fps)
     return _shifted(motion, lift)
 
@@ -78,6 +78,6 @@ def _sole(body: BodyModel, side: str) -> NDArray[np.intp]:
 
 
 def _shifted(motion: Motion, lift: Array | float) -> Motion:
-    return motion._with(
+    return motion.with_frames(
         motion.poses, motion.translations + np.multiply.outer(lift, np.array([0.0, 1.0, 0.0]))
     )

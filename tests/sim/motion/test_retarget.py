@@ -11,8 +11,8 @@ import pytest
 from muslin.garments.errors import InputError
 from muslin.sim.body import load_body
 from muslin.sim.motion import Motion, load_motion
+from muslin.sim.motion.arms import CLEARANCE, MAX_SPREAD, arm_parts, clearances, spread_arms
 from muslin.sim.motion.grounding import lowest_heights
-from muslin.sim.motion.retarget.arms import CLEARANCE, MAX_SPREAD, arm_parts, clearances, spread_arms
 from muslin.sim.motion.retarget.build import heal
 from muslin.sim.motion.retarget.bvh import read_bvh
 from muslin.sim.motion.retarget.deepmimic import read_deepmimic

@@ -1,6 +1,6 @@
 """Arms held clear of the trunk and the thighs, so that cloth has room between them.
 
-A retargeted arm has the angles of a leaner body and sinks into a fuller one. For each frame and side, the
+A captured arm has the angles of a leaner body and sinks into a fuller one. For each frame and side, the
 point of forearm, hand and lower upper arm that lies deepest asks for a turn of the shoulder that moves it
 out along the trunk's surface normal; turns are widened and smoothed in time, applied, and measured again.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
@@ -61,6 +61,7 @@ class ArmParts:
 
 
 def arm_parts(body: BodyModel, side: str) -> ArmParts:
+    """The parts of `body` on `side`, "left" or "right", by dominant skinning weight."""
     part = np.argmax(body.weights, axis=1)
     rest, joints = body.v_template, body.joint_template
     shoulder, elbow = JOINT[f"{side}_shoulder"], JOINT[f"{side}_elbow"]
@@ -108,7 +109,9 @@ def clearances(vertices: Array, parts: ArmParts) -> tuple[Array, Array]:
     return np.where(above, height, apart), normals[nearest]
 
 
-def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, float]]:
+def spread_arms(
+    motion: Motion, body: BodyModel, beta: ArrayLike | None = None
+) -> tuple[Motion, dict[str, float]]:
     """`motion` with arms clear of the trunk as far as MAX_SPREAD allows, and the figures:
 
     arm_spread_left / _right    largest turn of each shoulder, radians
@@ -123,7 +126,7 @@ def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, floa
         changed = np.arange(0, motion.num_frames, max(round(motion.fps / _CHECKS_PER_SECOND), 1))
         checked, spread = changed, motion
         for round_number in range(_ROUNDS + 1):
-            need[changed], distance[changed] = _turns(spread, changed, body, parts, shoulder)
+            need[changed], distance[changed] = _turns(spread, changed, body, beta, parts, shoulder)
             deepest = max(0.0, -float(distance[checked].min()))
             if round_number == 0:
                 figures["depth_before"] = max(figures["depth_before"], deepest)
@@ -139,16 +142,21 @@ def spread_arms(motion: Motion, body: BodyModel) -> tuple[Motion, dict[str, floa
 
 
 def _turns(
-    motion: Motion, frames: NDArray[np.intp], body: BodyModel, parts: ArmParts, shoulder: int
+    motion: Motion,
+    frames: NDArray[np.intp],
+    body: BodyModel,
+    beta: ArrayLike | None,
+    parts: ArmParts,
+    shoulder: int,
 ) -> tuple[Array, Array]:
     """Turns (n, 3) the frames' deepest arm vertices ask for, in the collar's frame, and their distances."""
     poses, translations = motion.poses[frames], motion.translations[frames]
-    pivots = forward_kinematics(poses, body.joint_template, translations)[:, shoulder]
+    pivots = forward_kinematics(poses, body.rest_joints(beta), translations)[:, shoulder]
     collars = conjugate(global_rotations(poses)[:, PARENTS[shoulder]])
     turns, smallest = np.zeros((len(frames), 3)), np.empty(len(frames))
     for start in range(0, len(frames), _BLOCK):
         block = slice(start, start + _BLOCK)
-        for k, vertices in enumerate(body.vertices(None, poses[block], translations[block]), start):
+        for k, vertices in enumerate(body.vertices(beta, poses[block], translations[block]), start):
             distance, outward = clearances(vertices, parts)
             worst = int(np.argmin(distance))
             smallest[k] = distance[worst]
@@ -179,4 +187,4 @@ def _turned(motion: Motion, turns: Array, shoulder: int) -> Motion:
     poses = motion.poses.copy()
     local = multiply(quaternion_from_axis_angle(turns), motion.quaternions[:, shoulder])
     poses[:, shoulder] = axis_angle_from_quaternion(local)
-    return motion._with(poses, motion.translations)
+    return motion.with_frames(poses, motion.translations)
