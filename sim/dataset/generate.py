@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import queue
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,6 +19,7 @@ from muslin.sim.dataset.header import Header, prepare_root
 from muslin.sim.dataset.index import write_index
 from muslin.sim.dataset.jobs import Plan
 from muslin.sim.dataset.plan import plan
+from muslin.sim.dataset.processes import one_thread_each, usable_cores, worker_died
 from muslin.sim.dataset.schema import LOCK
 from muslin.sim.dataset.solver import solver_digest
 from muslin.sim.dataset.worker import ChainSimulator, Task, make_chain, start_worker
@@ -136,7 +135,7 @@ def _silent(done: float, total: int, message: str) -> None:
 
 def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progress) -> dict[str, str]:
     """Run the chains over processes; return {id: reason} of the samples that could not be made."""
-    usable = len(os.sched_getaffinity(0)) if device == "cpu" else 1
+    usable = usable_cores() if device == "cpu" else 1
     count = min(workers or usable, len(todo))
     if any(task.simulate is None for task in todo):
         progress(0.0, 0, "compiling kernels")
@@ -149,7 +148,7 @@ def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progr
     weight = {task.place: len(task.missing.intersection(job.id for job in task.chain.jobs)) for task in todo}
     parts = dict.fromkeys(weight, 0.0)
     failed: dict[str, str] = {}
-    with _one_thread_each():
+    with one_thread_each():
         pool = ProcessPoolExecutor(
             count, mp_context=context, initializer=start_worker, initargs=(news, leash)
         )
@@ -164,10 +163,7 @@ def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progr
                 message = _drain(news, parts)
                 progress(sum(parts[k] * weight[k] for k in weight), sum(weight.values()), message)
         except BrokenProcessPool as error:
-            raise InputError(
-                "a worker process died, most often because memory ran out; finished samples are kept: "
-                f"run again with fewer --workers than {count}"
-            ) from error
+            raise worker_died(count) from error
         except BaseException:
             held.close()  # ends the workers, whatever they are at
             raise
@@ -188,22 +184,3 @@ def _drain(news: Any, parts: dict[int, float]) -> str:
         except queue.Empty:
             return message
         parts[place] = part
-
-
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """One thread a process: faster with a process a core, and sums no longer depend on the number of
-    threads."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -25,7 +25,7 @@ PARTIAL = ".partial"
 LOCK = ".lock"
 SUFFIX = ".zarr"
 
-MASK_GAP_M = 2e-3
+MASK_GAP_M = 4e-3
 """A face of the body may be left out of contact only if it lies inside the body or within this distance of
 another part of its surface, metres."""
 

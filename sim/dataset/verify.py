@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -22,6 +21,12 @@ from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.header import read_header
 from muslin.sim.dataset.index import in_plan_order, listed_ids
 from muslin.sim.dataset.intersections import count_intersections
+from muslin.sim.dataset.processes import (
+    leave_interrupts_to_parent,
+    one_thread_each,
+    usable_cores,
+    worker_died,
+)
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.dataset.schema import MASK_GAP_M
 
@@ -103,7 +108,7 @@ def verify(
     ids = in_plan_order(header, {*listed_ids(root), *store.stored_ids(root)})
     # Damaged attributes fail their sample, so they must not fail the listing.
     tasks = [task for sample_id in ids for task in _tasks(root, sample_id)]
-    count = min(workers or len(os.sched_getaffinity(0)), max(1, len(tasks)))
+    count = min(workers or usable_cores(), max(1, len(tasks)))
     findings = []
     for done, finding in enumerate(_findings(tasks, count), start=1):
         findings.append(finding)
@@ -167,24 +172,27 @@ def _check_frame(sample: Sample, frame: int, masked: np.ndarray) -> tuple[tuple[
 
 def _findings(tasks: list[_Task], workers: int) -> Iterable[Finding]:
     if workers <= 1:
-        _start_worker()
         return (_run(task) for task in tasks)
     return _pooled(tasks, workers)
 
 
 def _pooled(tasks: list[_Task], workers: int) -> Iterator[Finding]:
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
+    with (
+        one_thread_each(),
+        ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool,
+    ):
         try:
             yield from pool.map(_run, tasks)
         except BrokenProcessPool as error:
-            raise InputError(
-                "a worker process died, most often because memory ran out: "
-                f"run again with fewer --workers than {workers}"
-            ) from error
+            raise worker_died(workers) from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _start_worker() -> None:
+    leave_interrupts_to_parent()
     ipctk.set_num_threads(1)
 
 

@@ -17,6 +17,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.jobs import Chain, Job
+from muslin.sim.dataset.processes import leave_interrupts_to_parent
 from muslin.sim.dataset.sample import Sample
 
 FrameProgress = Callable[[int, int], None]
@@ -47,6 +48,7 @@ _news: Any = None
 def start_worker(news: Any, leash: Connection) -> None:
     global _news
     _news = news
+    leave_interrupts_to_parent()
     # What the queue still holds must not keep a worker from ending when nobody reads it any more.
     news.cancel_join_thread()
     threading.Thread(target=_end_with_parent, args=(leash,), daemon=True).start()
@@ -103,7 +105,7 @@ def _named(job: Job, sample: Sample, task: Task, seconds: float) -> Sample:
         id=job.id,
         kind=job.kind,  # type: ignore[arg-type]
         seed=job.seed,
-        scene=job.scene,
+        scene=sample.scene or job.scene,
         labels=sample.labels | job.labels,
         fabric=sample.fabric or job.labels.get("fabric", ""),
         certificate=certificate,

@@ -14,7 +14,7 @@ from sheet_producer import make_sample
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.export import FORMATS, export_dataset, export_parts
-from muslin.sim.dataset.parts import read_mesh, sample_parts
+from muslin.sim.dataset.parts import Part, read_mesh, sample_parts
 from muslin.sim.dataset.pc2 import read_pc2
 from muslin.sim.dataset.reader import Dataset, write_dataset
 
@@ -168,6 +168,20 @@ def test_files_that_are_no_mesh(tmp_path: Path, name: str, text: str | None, mes
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=message):
         read_mesh(tmp_path / name)
+
+
+def test_seams_cut_the_uv_of_an_obj_but_not_its_surface(tmp_path: Path) -> None:
+    square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    uv = np.array([[0, 0], [0.4, 0], [0.4, 0.4], [0.5, 0.5], [0.9, 0.9], [0.5, 0.9]])
+    part = Part("square", square, faces, uv, np.arange(6, dtype=np.int32).reshape(2, 3))
+    np.testing.assert_array_equal(part.uv_to_vertex, [0, 1, 2, 0, 2, 3])
+    (file,) = export_parts("cut", [part], None, tmp_path, "obj")
+    read = read_mesh(file)
+    np.testing.assert_array_equal(read.positions, square)
+    np.testing.assert_array_equal(read.faces, faces)
+    (file,) = export_parts("cut", [part], None, tmp_path, "glb")
+    assert read_mesh(file).positions.shape == (1, 6, 3)
 
 
 def test_a_moving_obstacle_moves_in_the_export(tmp_path: Path) -> None:

@@ -147,12 +147,12 @@ def test_killed_at_any_moment_it_completes_to_the_same_dataset(whole: Path, tmp_
     out = tmp_path / "killed"
     moments = random.Random(4)
     kept = 0
-    for _ in range(2):
+    for how in (signal.SIGKILL, signal.SIGINT):
         process = start(out, delay)
         wait_for_samples(out, kept + 1)
         time.sleep(moments.uniform(0.0, 2 * delay))
         workers = children(process.pid)
-        process.send_signal(signal.SIGKILL)
+        process.send_signal(how)
         process.communicate()
         wait_until_gone(workers)
         before, kept = kept, len(store.stored_ids(out))
