@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 Point = tuple[float, float]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-_PIECES = 32  # sub-intervals of a Bezier curve; 12-point Gauss quadrature on each is exact to rounding
+_PIECES = (
+    32  # sub-intervals of a Bezier curve; with 12-point Gauss quadrature exact to rounding unless near a cusp
+)
 _NEWTON_STEPS = 8
 
 
@@ -21,6 +23,11 @@ class Line:
 
     start: Point
     end: Point
+
+    @property
+    def control_points(self) -> NDArray[np.float64]:
+        """(2, 2) start and end, metres."""
+        return np.array([self.start, self.end], dtype=np.float64)
 
     @cached_property
     def length(self) -> float:
@@ -56,19 +63,20 @@ class CubicBezier:
     end: Point
 
     @cached_property
-    def _points(self) -> NDArray[np.float64]:
+    def control_points(self) -> NDArray[np.float64]:
+        """(4, 2) start, the two control points and end, metres."""
         return np.array([self.start, self.control_1, self.control_2, self.end], dtype=np.float64)
 
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
         """Points (..., 2) at curve parameters t (...)."""
         t = np.asarray(t, dtype=np.float64)[..., None]
-        p, s = self._points, 1.0 - np.asarray(t)
+        p, s = self.control_points, 1.0 - np.asarray(t)
         return s**3 * p[0] + 3 * s**2 * t * p[1] + 3 * s * t**2 * p[2] + t**3 * p[3]
 
     def derivative(self, t: ArrayLike) -> NDArray[np.float64]:
         """dx/dt (..., 2) at curve parameters t (...)."""
         t = np.asarray(t, dtype=np.float64)[..., None]
-        d, s = 3.0 * np.diff(self._points, axis=0), 1.0 - np.asarray(t)
+        d, s = 3.0 * np.diff(self.control_points, axis=0), 1.0 - np.asarray(t)
         return s**2 * d[0] + 2 * s * t * d[1] + t**2 * d[2]
 
     def _arc(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

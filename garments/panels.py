@@ -63,7 +63,7 @@ class Panel:
             raise InputError(f"panel '{self.name}' names edge '{repeated[0]}' twice; edge names must differ")
         for edge, following in zip(self.edges, self.edges[1:] + self.edges[:1], strict=True):
             where = f"panel '{self.name}', edge '{edge.name}'"
-            if not np.isfinite(edge.curve.at(np.linspace(0.0, 1.0, 5))).all():
+            if not np.isfinite(edge.curve.control_points).all():
                 raise InputError(
                     f"{where}: a point is NaN or infinite; all coordinates must be finite metres"
                 )

@@ -10,7 +10,8 @@ from muslin.garments.errors import InputError
 from muslin.garments.mesh import signed_areas
 
 CLEARANCE = 0.62  # least distance of a lattice point from the boundary, in edge lengths
-SMOOTHING_STEPS = 30
+LONGEST = 1.6  # of interior edges, in edge lengths; longer ones are split
+SMOOTHING_STEPS, SPLIT_ROUNDS = 20, 4
 
 
 def triangulate_polygon(
@@ -27,17 +28,23 @@ def triangulate_polygon(
 
     optimal Delaunay triangulation (L. Chen and M. Holst 2011, "Efficient mesh optimization schemes based on
     optimal Delaunay triangulations"). In obtuse triangles the centroid stands for the circumcentre, which may
-    lie outside; that keeps points near the boundary inside.
+    lie outside; that keeps points near the boundary inside. Where the lattice left a gap, long edges are
+    split.
 
     Raises InputError if the polygon is too narrow for the edge length.
     """
-    interior = _lattice(boundary, edge_length, rng)
-    points = np.concatenate([boundary, interior])
+    points = np.concatenate([boundary, _lattice(boundary, edge_length, rng)])
     fixed = len(boundary)
-    faces = _constrained_delaunay(points, fixed)
-    for _ in range(SMOOTHING_STEPS if len(interior) else 0):
-        points[fixed:] = _optimal_positions(points, faces)[fixed:]
+    for _ in range(SPLIT_ROUNDS):
         faces = _constrained_delaunay(points, fixed)
+        for _ in range(SMOOTHING_STEPS if len(points) > fixed else 0):
+            points[fixed:] = _optimal_positions(points, faces)[fixed:]
+            faces = _constrained_delaunay(points, fixed)
+        gaps = _long_edges(points, faces, LONGEST * edge_length)
+        if len(gaps) == 0:
+            break
+        points = np.concatenate([points, points[gaps].mean(axis=1)])
+    faces = _constrained_delaunay(points, fixed)
     missing = _missing_edges(faces, fixed)
     if len(missing) or len(faces) != 2 * len(points) - fixed - 2:
         raise InputError(
@@ -111,6 +118,15 @@ def _optimal_positions(points: NDArray[np.float64], faces: NDArray[np.int32]) ->
         for k in range(2)
     ]
     return np.stack(mean, axis=1) / weight[:, None]
+
+
+def _long_edges(points: NDArray[np.float64], faces: NDArray[np.int32], longest: float) -> NDArray[np.int32]:
+    """(n, 2) interior edges longer than `longest` that are the longest of both their triangles."""
+    half = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)
+    lengths = np.linalg.norm(points[half[..., 0]] - points[half[..., 1]], axis=-1)
+    chosen = half[np.arange(len(faces)), lengths.argmax(axis=1)][lengths.max(axis=1) > longest]
+    edges, counts = np.unique(np.sort(chosen, axis=1), axis=0, return_counts=True)
+    return edges[counts == 2]
 
 
 def _missing_edges(faces: NDArray[np.int32], fixed: int) -> NDArray[np.int64]:

@@ -1,7 +1,7 @@
 """Reference panels of a design and the triangulations of them that its templates and its uv layout use.
 
-Triangulations of catalogue designs are stored in `assets/`, so that the connectivity, on which trained
-networks depend, is the same on every machine and with every version of SciPy. `python -m
+Triangulations of designs that networks are trained on are stored in `assets/`, so that the connectivity, on
+which trained networks depend, is the same on every machine and with every version of SciPy. `python -m
 muslin.garments.bake` writes them.
 """
 
@@ -88,8 +88,7 @@ def asset_path(design_name: str, resolution: str) -> Path:
 
 
 def digest(pattern: Pattern, edge_length: float) -> str:
-    """Hash of all that a triangulation depends on: the pattern's curves (to 1e-9 m) and seams, the edge
-    length."""
+    """Hash of what a triangulation depends on: curves (to 1e-9 m), seams and edge length."""
     text = [f"{edge_length!r}"]
     for panel in pattern.panels:
         for edge in panel.edges:
