@@ -23,6 +23,7 @@ from muslin.sim.dataset.sample import Sample
 
 MM = 1000.0
 SURFACE_FRAMES = 24
+ONE_FRAME = "velocity errors are null: one frame only"
 
 Progress = Callable[[float, int, str], None]
 
@@ -161,6 +162,8 @@ def compare(
         frames += score.num_frames
     if progress is not None:
         progress(len(pairs), len(pairs), "")
+    if totals.velocity.errors:
+        notes = [note for note in notes if note != ONE_FRAME]
     return Comparison(
         prediction=str(prediction),
         truth=str(truth),
@@ -213,7 +216,7 @@ def _score_vertices(prediction: Track, truth: Track, totals: Totals, notes: list
     for x, y in zip(prediction.positions, truth.positions, strict=True):
         totals.vertex.update(vertex_errors(x, y), vertex_areas(y, truth.faces))
     if len(truth.positions) < 2:
-        notes.append("velocity errors are null: one frame only")
+        notes.append(ONE_FRAME)
     elif truth.fps is None:
         notes.append("velocity errors are null: the frame rate is not known; give it (--fps)")
     else:

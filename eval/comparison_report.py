@@ -15,6 +15,7 @@ from muslin.eval.subjects import Track, open_subject
 from muslin.sim.view.camera import frame_camera
 from muslin.sim.view.heatmap import colours, with_bar
 from muslin.sim.view.layer import OBSTACLE, SKIN, Layer
+from muslin.sim.view.lighting import DRAFT
 from muslin.sim.view.picture import AZIMUTH, ELEVATION, facing
 from muslin.sim.view.render import render
 
@@ -190,7 +191,7 @@ def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
     layers.append(Layer(positions, prediction.faces, shades, sheet=True, gloss=0.0, flat_light=True))
     points = np.concatenate([layer.vertices for layer in layers])
     camera = frame_camera(points, *HEAT_SIZE, azimuth, ELEVATION)
-    image = render(layers, camera, HEAT_SIZE, ground=float(points[:, 1].min()))
+    image = render(layers, camera, HEAT_SIZE, DRAFT, float(points[:, 1].min()))
     return with_bar(image, 0.0, high, "mm")
 
 

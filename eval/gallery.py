@@ -14,8 +14,9 @@ import numpy as np
 
 from muslin.sim.dataset import store
 from muslin.sim.dataset.sample import Sample
+from muslin.sim.view.camera import Camera
 from muslin.sim.view.lighting import DRAFT, FINE
-from muslin.sim.view.picture import picture, sample_camera
+from muslin.sim.view.picture import picture, sample_cameras
 
 DRAPE_SIZE = (390, 520)
 MOVIE_SIZE = (300, 400)
@@ -25,7 +26,7 @@ Progress = Callable[[float, int, str], None]
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture to draw: a frame of a sample; with `frames` by one camera that holds them all."""
+    """One picture to draw: a frame of a sample; with `frames` as one of that movie."""
 
     root: Path
     sample_id: str
@@ -58,8 +59,14 @@ def _draw(shot: Shot) -> np.ndarray:
     sample = _sample(shot.root, shot.sample_id)
     if not shot.frames:
         return picture(sample, shot.frame, DRAPE_SIZE, quality=FINE)
-    camera, ground = sample_camera(sample, shot.frames, MOVIE_SIZE)
+    cameras, ground = _cameras(shot.root, shot.sample_id, shot.frames)
+    camera = cameras[shot.frames.index(shot.frame)]
     return picture(sample, shot.frame, MOVIE_SIZE, quality=DRAFT, camera=camera, ground=ground)
+
+
+@lru_cache(maxsize=2)
+def _cameras(root: Path, sample_id: str, frames: tuple[int, ...]) -> tuple[list[Camera], float]:
+    return sample_cameras(_sample(root, sample_id), frames, MOVIE_SIZE)
 
 
 @lru_cache(maxsize=2)

@@ -37,7 +37,8 @@ def line_plot(lines: Mapping[str, Line], x_label: str, y_label: str, points: boo
         axes = figure.add_subplot()
         for (name, (x, y)), colour in zip(lines.items(), COLOURS * (1 + len(lines) // 6), strict=False):
             axes.plot(x, y, color=colour, label=name, marker="o" if points else None, markersize=4, lw=1.6)
-        axes.set_ylim(bottom=0.0)
+        highest = max((max(y) for _, y in lines.values()), default=0.0)
+        axes.set_ylim(0.0, 1.1 * highest or 1.0)
         axes.set_xlabel(x_label)
         axes.set_ylabel(y_label)
         axes.grid(alpha=0.15, color=INK)

@@ -38,9 +38,9 @@ def evaluate(
       muslin eval mine.obj theirs.obj
       muslin eval frames_a/ frames_b/ --fps 30
     """
+    from muslin.eval.cli.progress import progress_bar
     from muslin.eval.compare import compare
     from muslin.eval.page import write_atomically
-    from muslin.sim.dataset.progress_bar import progress_bar
 
     for file in (json_file, html_file):
         if file is not None:

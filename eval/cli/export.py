@@ -27,9 +27,9 @@ def export(
       muslin export out/walk --format usd --out out/usd --no-body
       muslin export mesh.obj --format ply --out out/ply
     """
+    from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.export import export_dataset, export_parts
     from muslin.sim.dataset.parts import read_mesh
-    from muslin.sim.dataset.progress_bar import progress_bar
 
     if source.is_file():
         files = export_parts(source.stem, [read_mesh(source)], None, out, file_format)

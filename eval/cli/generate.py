@@ -27,9 +27,9 @@ def generate(
       muslin generate scenes/demo.toml --out out/demo --workers 8
       muslin generate scenes/demo.toml --out out/coarse --set scene.garment.resolution=403
     """
+    from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.config import load_config
     from muslin.sim.dataset.generate import generate as run
-    from muslin.sim.dataset.progress_bar import progress_bar
 
     loaded = load_config(config, overrides or [])
     name = check_device(device)

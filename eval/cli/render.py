@@ -78,8 +78,8 @@ def _still(
     import numpy as np
     from PIL import Image
 
+    from muslin.eval.cli.progress import progress_bar
     from muslin.eval.page import write_atomically
-    from muslin.sim.dataset.progress_bar import progress_bar
     from muslin.sim.view.picture import AZIMUTH, picture
     from muslin.sim.view.sheet import contact_sheet
 
@@ -104,7 +104,7 @@ def _still(
 
 
 def _movie(sample: Sample, out: Path, size: tuple[int, int]) -> None:
-    from muslin.sim.dataset.progress_bar import progress_bar
+    from muslin.eval.cli.progress import progress_bar
     from muslin.sim.view.movie import TURNTABLE_FPS, frame_choice, movie_frames, turntable, write_movie
 
     with progress_bar("draw") as update:

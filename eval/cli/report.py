@@ -38,9 +38,9 @@ def report(
       muslin report out/demo --html out/demo-report.html
       muslin report out/demo --html report.html --verification out/demo-verified.json
     """
+    from muslin.eval.cli.progress import progress_bar
     from muslin.eval.page import write_atomically
     from muslin.eval.report import dataset_report
-    from muslin.sim.dataset.progress_bar import progress_bar
 
     make_parent(html_file)
     verified = None if verification is None else _read(verification)

@@ -30,7 +30,7 @@ def simulate(
     loaded = load_scene(scene, overrides or [])
     name = check_device(device)
 
-    from muslin.sim.dataset.progress_bar import progress_bar
+    from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.reader import write_dataset
     from muslin.sim.run import simulate as run
 

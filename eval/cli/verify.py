@@ -27,7 +27,7 @@ def verify(
       muslin verify out/demo
       muslin verify out/demo --json out/demo-verified.json
     """
-    from muslin.sim.dataset.progress_bar import progress_bar
+    from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.verify import verify as run
 
     if json_file is not None:

@@ -57,13 +57,13 @@ def one_sided_hausdorff(
 ) -> HausdorffBounds:
     """Bounds of h(A, B) by branch and bound over the triangles of A.
 
-    For a triangle t of A with corners p_j, whose nearest triangles in B are T_i:
+    For a triangle t of A with corners p_j and centre c, whose nearest triangles in B are T_i:
 
         lower(t) = max_j d(p_j, B)
         upper(t) = min( min_i max_j d(p_j, T_i),  d(c, B) + max_j |p_j - c| )
 
     The first upper bound holds because the distance to one (convex) triangle is a convex function, so its
-    largest value over t is at a corner; the second because d(., B) is 1-Lipschitz, with the centre c.
+    largest value over t is at a corner; the second because d(., B) is 1-Lipschitz.
     Triangles whose upper bound exceeds the best lower bound by no more than the tolerance are dropped, the
     others split in four.
 
@@ -87,9 +87,10 @@ def one_sided_hausdorff(
         open_ = np.flatnonzero(upper > lower + tolerance)
         if len(open_):
             centre = corners[open_].mean(axis=1)
-            at_centre, _ = _query(tree, target_v, target_f, centre)
+            at_centre, below_centre = _query(tree, target_v, target_f, centre)
             reach = np.linalg.norm(corners[open_] - centre[:, None], axis=-1).max(axis=1)
-            upper[open_] = np.minimum(upper[open_], at_centre + reach)
+            convex = _convex_bound(corners[open_], target_v[target_f], below_centre[:, None])
+            upper[open_] = np.minimum(upper[open_], np.minimum(convex, at_centre + reach))
             lower = max(lower, float(at_centre.max()))
             tolerance = max(absolute, relative * lower)
         split = upper > lower + tolerance
@@ -130,9 +131,9 @@ def _segment_squared(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> 
 
 
 def _convex_bound(corners: np.ndarray, targets: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-    """min_i max_j d(p_j, T_i); (N,)."""
+    """min_i max_j d(p_j, T_i); (N,). nearest (N, k): the triangles T_i."""
     bounds = []
-    for i in range(3):
+    for i in range(nearest.shape[1]):
         triangles = targets[nearest[:, i]]
         bounds.append(np.max([point_triangle_distance(corners[:, j], triangles) for j in range(3)], axis=0))
     return np.min(bounds, axis=0)

@@ -13,7 +13,7 @@ from PIL import Image
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.view.lighting import DRAFT, Quality
-from muslin.sim.view.picture import AZIMUTH, picture, sample_camera
+from muslin.sim.view.picture import AZIMUTH, picture, sample_cameras
 
 Progress = Callable[[int, int], None]
 TURNTABLE_FRAMES = 36
@@ -42,10 +42,10 @@ def movie_frames(
     quality: Quality = DRAFT,
     progress: Progress | None = None,
 ) -> list[np.ndarray]:
-    """Pictures of the frames with one still camera that holds all of them."""
-    camera, ground = sample_camera(sample, frames, size)
+    """Pictures of the frames by a camera that walks beside the wearer."""
+    cameras, ground = sample_cameras(sample, frames, size)
     pictures = []
-    for i, frame in enumerate(frames):
+    for i, (frame, camera) in enumerate(zip(frames, cameras, strict=True)):
         pictures.append(picture(sample, frame, size, quality=quality, camera=camera, ground=ground))
         if progress is not None:
             progress(i + 1, len(frames))

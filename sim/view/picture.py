@@ -15,6 +15,7 @@ from muslin.sim.view.render import render
 
 AZIMUTH = float(np.deg2rad(22.0))  # from the front, a little from the wearer's left
 ELEVATION = float(np.deg2rad(7.0))
+STEADY = 0.8  # seconds over which a walking camera's path is averaged
 PALETTE = (
     FABRIC,
     (0.62, 0.26, 0.24),
@@ -75,17 +76,28 @@ def rotation_matrix(axis_angle: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def sample_camera(
+def sample_cameras(
     sample: Sample, frames: Sequence[int], size: tuple[int, int], azimuth: float = AZIMUTH
-) -> tuple[Camera, float]:
-    """A camera that holds the given frames together, from the front of the first; the ground's height."""
+) -> tuple[list[Camera], float]:
+    """A camera a frame, and the height of the ground.
+
+    The camera looks from one direction, from the front of the first frame, and walks beside the wearer: its
+    path is that of the figure's middle, averaged over `STEADY` seconds. All frames together fill the picture.
+    """
     clouds = []
     for frame in frames:
         body = sample.body_vertices(frame)
-        clouds.append(np.concatenate([sample.positions[frame], body[:: max(1, len(body) // 2000)]]))
-    points = np.concatenate(clouds).astype(np.float64)
-    camera = frame_camera(points, *size, facing(sample, frames[0]) + azimuth, ELEVATION)
-    return camera, float(points[:, 1].min())
+        some = body[:: max(1, len(body) // 2000)]
+        clouds.append(np.concatenate([sample.positions[frame].astype(np.float64), some]))
+    ground = min(float(cloud[:, 1].min()) for cloud in clouds)
+    middles = np.array([0.5 * (cloud.min(axis=0) + cloud.max(axis=0)) for cloud in clouds])
+    middles[:, 1] = 0.0
+    seconds = sample.times[list(frames)]
+    near = np.maximum(0.0, 1.0 - np.abs(seconds[:, None] - seconds) / (STEADY / 2))
+    path = near @ middles / near.sum(axis=1, keepdims=True)
+    points = np.concatenate([cloud - step for cloud, step in zip(clouds, path, strict=True)])
+    still = frame_camera(points, *size, facing(sample, frames[0]) + azimuth, ELEVATION)
+    return [Camera(still.eye + step, still.target + step, still.field_of_view) for step in path], ground
 
 
 def picture(
@@ -104,5 +116,5 @@ def picture(
     camera    with `ground`, instead of one that frames this frame by itself
     """
     if camera is None:
-        camera, ground = sample_camera(sample, [frame], size, azimuth)
+        (camera,), ground = sample_cameras(sample, [frame], size, azimuth)
     return render(sample_layers(sample, frame, colours), camera, size, quality, ground)

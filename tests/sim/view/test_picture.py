@@ -1,6 +1,7 @@
 """Pictures: projection and framing in closed form, rays against geometry, light against solid angles."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from muslin.sim.view.heatmap import BAR_SPACE, colours, with_bar
 from muslin.sim.view.layer import Layer, seam_edges, vertex_normals
 from muslin.sim.view.lighting import Lights, Quality, key_directions, received
 from muslin.sim.view.movie import frame_choice, gif_bytes, write_movie
-from muslin.sim.view.picture import picture, rotation_matrix
+from muslin.sim.view.picture import picture, rotation_matrix, sample_cameras
 from muslin.sim.view.rays import cast, lit_share
 from muslin.sim.view.render import render
 from muslin.sim.view.sheet import GAP, contact_sheet
@@ -204,6 +205,27 @@ def test_movies_keep_time(tmp_path):
     assert (tmp_path / "m.mp4").stat().st_size > 500
     with pytest.raises(InputError, match=r"\.gif or \.mp4"):
         write_movie(tmp_path / "m.avi", pictures, 12.0)
+
+
+def test_camera_walks_with_the_figure():
+    still = sample(1)
+    walking = replace(
+        still,
+        kind="sequence",
+        fps=30.0,
+        positions=np.concatenate([still.positions + np.float32([0.1 * t, 0, 0]) for t in range(60)]),
+        obstacle_vertices=np.concatenate(
+            [still.obstacle_vertices + np.float32([0.1 * t, 0, 0]) for t in range(60)]
+        ),
+    ).validate()
+    cameras, ground = sample_cameras(walking, range(60), (120, 160))
+    middle = np.diff([camera.eye for camera in cameras], axis=0)[15:-15]
+    assert middle == pytest.approx(np.broadcast_to([0.1, 0, 0], middle.shape), abs=1e-6)
+    assert ground == pytest.approx(-0.3, abs=1e-6)
+    for t in (0, 30, 59):
+        p = cameras[t].project(walking.positions[t].astype(float), 120, 160)
+        assert (p > 0).all()
+        assert (p < [120, 160]).all()
 
 
 def test_window_without_display_says_what_to_do(monkeypatch):

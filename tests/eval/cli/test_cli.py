@@ -1,0 +1,251 @@
+"""Every command on small, real data: what it writes, what it refuses, with which exit code."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from typer.testing import CliRunner
+
+from muslin.eval.cli.app import app
+from muslin.sim.dataset.reader import open_dataset, write_dataset
+
+COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "render", "view")
+
+
+def muslin(*arguments, code: int = 0):
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exit_code == code, (result.output, result.exception)
+    return result
+
+
+def refused(*arguments, says: str):
+    """Exit code 2, one line on standard error, no traceback."""
+    result = muslin(*arguments, code=2)
+    assert says in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in result.output
+
+
+@pytest.fixture
+def dataset(tmp_path, make_sample):
+    write_dataset(tmp_path / "data", [make_sample("still"), make_sample("moving", frames=3, height=0.25)])
+    return tmp_path / "data"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_examples(command):
+    output = muslin(command, "--help").output
+    assert "Example" in output
+    assert f"muslin {command}" in output
+
+
+def test_version_and_commands():
+    assert muslin("--version").output.startswith("muslin ")
+    help_text = muslin("--help").output
+    assert all(command in help_text for command in COMMANDS)
+    assert muslin("nonsense", code=2)
+
+
+def test_help_loads_no_heavy_library():
+    code = (
+        "import sys; from muslin.eval.cli.app import app; "
+        "print([m for m in ('warp','torch','pyvista','matplotlib','igl','zarr','scipy') if m in sys.modules])"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
+
+
+def test_verify_passes_and_writes_json(dataset, tmp_path):
+    muslin("verify", dataset, "--json", tmp_path / "v.json", "--workers", 1)
+    result = json.loads((tmp_path / "v.json").read_text())
+    assert (result["samples"], result["frames"]) == (2, 4)
+    assert result["cloth_cloth_intersections"] == result["cloth_body_intersections"] == 0
+    assert result["failed"] == []
+
+
+def test_verify_fails_on_an_intersecting_sample(tmp_path, make_sample):
+    write_dataset(tmp_path / "bad", [make_sample("good"), make_sample("cut", height=0.1, n=21)])
+    result = muslin("verify", tmp_path / "bad", "--json", tmp_path / "v.json", "--workers", 1, code=1)
+    assert "cut" in result.stderr
+    found = json.loads((tmp_path / "v.json").read_text())
+    assert found["failed"] == ["cut"]
+    assert found["cloth_body_intersections"] > 0
+
+
+def test_info(dataset):
+    assert "still" in muslin("info", dataset, "--samples").output
+    facts = json.loads(muslin("info", dataset, "--json").output)
+    assert (facts["samples"], facts["frames"]) == (2, 4)
+
+
+def test_eval_of_a_dataset_against_itself(dataset, tmp_path):
+    muslin("eval", dataset, dataset, "--json", tmp_path / "e.json", "--html", tmp_path / "e.html")
+    result = json.loads((tmp_path / "e.json").read_text())
+    assert result["vertex_error_mm"] == dict.fromkeys(("mean", "rms", "median", "p95", "max"), 0.0)
+    assert result["velocity_error_mm_s"]["mean"] == 0.0
+    assert result["hausdorff_mm"] <= 0.01
+    assert result["penetration"]["ratio"] == 0.0
+    page = (tmp_path / "e.html").read_text()
+    assert "data:image/jpeg" in page
+    assert 'src="http' not in page
+
+
+def test_eval_of_mesh_files(tmp_path):
+    ball = trimesh.creation.icosphere(2)
+    ball.export(tmp_path / "a.obj")
+    ball.apply_scale(1.01)
+    ball.export(tmp_path / "b.ply")
+    output = muslin("eval", tmp_path / "b.ply", tmp_path / "a.obj").output
+    assert "mean 10 " in output
+
+
+def test_report_shows_and_cites_the_verification(dataset, tmp_path):
+    muslin("verify", dataset, "--json", tmp_path / "v.json", "--workers", 1)
+    muslin(
+        "report",
+        dataset,
+        "--html",
+        tmp_path / "r.html",
+        "--verification",
+        tmp_path / "v.json",
+        "--workers",
+        1,
+    )
+    page = (tmp_path / "r.html").read_text()
+    assert page.count("data:image/jpeg") == 2  # the drape and the contact sheet
+    assert page.count("data:image/gif") == 1
+    assert "checked again" in page
+    assert "gray-interlock" in page
+    for outside in ('src="http', 'href="http', "@import", "url(http"):
+        assert outside not in page
+
+
+def test_export_refuses_to_overwrite(dataset, tmp_path):
+    muslin("export", dataset, "--format", "obj", "--out", tmp_path / "obj", "--sample", "still")
+    assert (tmp_path / "obj" / "still_cloth.obj").is_file()
+    refused("export", dataset, "--format", "obj", "--out", tmp_path / "obj", "--sample", "still", says="obj")
+    refused("export", dataset, "--format", "max", "--out", tmp_path / "x", says="max")
+
+
+def test_export_of_a_mesh_file(tmp_path):
+    trimesh.creation.icosphere(1).export(tmp_path / "a.obj")
+    muslin("export", tmp_path / "a.obj", "--format", "ply", "--out", tmp_path / "out")
+    assert len(list((tmp_path / "out").glob("*.ply"))) == 1
+
+
+@pytest.mark.parametrize("suffix", ["json", "obj", "svg", "png"])
+def test_pattern(tmp_path, suffix):
+    out = tmp_path / f"tee.{suffix}"
+    muslin("pattern", "tee", "-p", "sleeve_length=0.3", "--edge-length", 0.05, "--out", out)
+    assert out.stat().st_size > 500
+    before = out.read_bytes()
+    refused("pattern", "tee", "--out", out, says="--force")
+    assert out.read_bytes() == before
+
+
+def test_forced_pattern_is_replaced(tmp_path):
+    out = tmp_path / "tee.json"
+    muslin("pattern", "tee", "--out", out)
+    before = out.read_bytes()
+    muslin("pattern", "tee", "-p", "sleeve_length=0.5", "--out", out, "--force")
+    assert out.read_bytes() != before
+
+
+def test_pattern_refusals(tmp_path):
+    out = tmp_path / "p.json"
+    refused("pattern", "cape", "--out", out, says="tee")
+    refused("pattern", "tee", "-p", "sleeve=0.2", "--out", out, says="sleeve_length")
+    refused("pattern", "tee", "-p", "sleeve_length=9", "--out", out, says="sleeve_length")
+    refused("pattern", "tee", "-p", "sleeve_length=long", "--out", out, says="number")
+    refused("pattern", "tee", "--out", tmp_path / "p.dxf", says=".svg")
+    refused("pattern", tmp_path / "none.json", "--out", out, says="none.json")
+    assert not out.exists()
+
+
+def test_render_pictures_and_movies(dataset, tmp_path):
+    muslin("render", dataset, "--out", tmp_path / "sheet.png")
+    assert Image.open(tmp_path / "sheet.png").width > 480
+    muslin(
+        "render", dataset, "--sample", "moving", "--frame", 2, "--size", "120x90", "--out", tmp_path / "f.png"
+    )
+    assert Image.open(tmp_path / "f.png").size == (120, 90)
+    muslin("render", dataset, "--size", "64x80", "--out", tmp_path / "m.gif")
+    assert Image.open(tmp_path / "m.gif").n_frames == 2
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data", "f.png", "m.gif", "sheet.png"]
+    refused("render", dataset, "--out", tmp_path / "m.gif", says="--force")
+    refused("render", dataset, "--out", tmp_path / "m.avi", says=".mp4")
+    refused("render", dataset, "--size", "big", "--out", tmp_path / "n.png", says="WIDTHxHEIGHT")
+    refused("render", dataset, "--sample", "moving", "--frame", 3, "--out", tmp_path / "n.png", says="0 to 2")
+    refused("render", dataset, "--sample", "nobody", "--out", tmp_path / "n.png", says="nobody")
+
+
+def test_view_without_display(dataset, monkeypatch):
+    monkeypatch.setattr("muslin.sim.view.window.sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    refused("view", dataset, says="muslin render")
+
+
+@pytest.mark.parametrize("command", ["verify", "info", "view"])
+def test_no_dataset_is_one_line(command, tmp_path):
+    refused(command, tmp_path / "nothing", says="nothing")
+    assert not (tmp_path / "nothing").exists()
+
+
+def test_damaged_sample_is_one_line(dataset):
+    meta = dataset / "samples" / "still.zarr" / "zarr.json"
+    meta.write_text(meta.read_text()[:40])
+    refused("eval", dataset, dataset, says="still")
+
+
+def test_newer_schema_is_one_line(dataset):
+    header = json.loads((dataset / "muslin.json").read_text())
+    (dataset / "muslin.json").write_text(json.dumps(header | {"schema_version": 99}))
+    refused("info", dataset, says="newer")
+
+
+def test_simulate_and_generate_refuse_bad_input_before_they_begin(tmp_path, dataset):
+    refused("simulate", tmp_path / "none.toml", "--out", tmp_path / "out", says="none.toml")
+    refused("generate", tmp_path / "none.toml", "--out", tmp_path / "out", says="none.toml")
+    scene = tmp_path / "scene.toml"
+    scene.write_text('fabric = "gray-interlock"\nspeed = 3\n[body]\nmodel = "female"\n')
+    refused("simulate", scene, "--out", tmp_path / "out", says="speed")
+    scene.write_text('[body]\nmodel = "female"\n')
+    refused("simulate", scene, "--out", tmp_path / "out", "--device", "gpu", says="cuda:0")
+    refused("simulate", scene, "--out", tmp_path / "out", "--set", "fabric=tin", says="tin")
+    refused("simulate", scene, "--out", dataset, says="not an empty folder")
+    assert not (tmp_path / "out").exists()
+    assert len(open_dataset(dataset)) == 2
+
+
+def test_simulation_error_is_exit_code_three(tmp_path, monkeypatch):
+    from muslin.sim import run
+    from muslin.sim.solve.errors import SimulationError
+
+    def stop(*_):
+        raise SimulationError("frame 3, vertex 17: no step is free of intersections; use a smaller dt")
+
+    monkeypatch.setattr(run, "simulate", stop)
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[body]\nmodel = "female"\n')
+    result = muslin("simulate", scene, "--out", tmp_path / "out", code=3)
+    assert "frame 3, vertex 17" in result.stderr
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_simulated_sample_is_stored(tmp_path, make_sample, monkeypatch):
+    from muslin.sim import run
+
+    sample = make_sample("made")
+    monkeypatch.setattr(run, "simulate", lambda scene, device, progress: sample)
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[body]\nmodel = "female"\n')
+    muslin("simulate", scene, "--out", tmp_path / "out")
+    stored = open_dataset(tmp_path / "out")["made"]
+    assert np.array_equal(stored.positions, sample.positions)
+    refused("simulate", scene, "--out", tmp_path / "out", says="not an empty folder")
