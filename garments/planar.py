@@ -12,6 +12,7 @@ from muslin.garments.mesh import signed_areas
 CLEARANCE = 0.62  # least distance of a lattice point from the boundary, in edge lengths
 LONGEST = 1.6  # of interior edges, in edge lengths; longer ones are split
 SMOOTHING_STEPS, SPLIT_ROUNDS = 20, 4
+_CHUNK = 1024  # points tested against a polygon at once
 
 
 def triangulate_polygon(
@@ -56,12 +57,14 @@ def triangulate_polygon(
 
 def contains(polygon: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(N,) whether points (N, 2) lie inside the closed polygon (B, 2), by the even-odd rule."""
-    inside = np.zeros(len(points), dtype=bool)
-    x, y = points[:, 0], points[:, 1]
-    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        if ay != by:
-            spans = (ay > y) != (by > y)
-            inside ^= spans & (x < ax + (bx - ax) * (y - ay) / (by - ay))
+    ax, ay = polygon.T
+    bx, by = np.roll(polygon, -1, axis=0).T
+    slope = (bx - ax) / np.where(by == ay, 1.0, by - ay)  # level edges span no height and never count
+    inside = np.empty(len(points), dtype=bool)
+    for start in range(0, len(points), _CHUNK):
+        x, y = points[start : start + _CHUNK, :, None].transpose(1, 0, 2)
+        crossed = ((ay > y) != (by > y)) & (x < ax + slope * (y - ay))
+        inside[start : start + _CHUNK] = crossed.sum(axis=1) % 2 == 1
     return inside
 
 
