@@ -2,7 +2,7 @@
 
 Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the body
 there, and only there: a vertex whose surroundings along its outward normal are taken by another part of the body
-within `MASK_GAP_M` is drawn inwards,
+within `ROOM` is drawn inwards,
 
     s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
 
@@ -21,6 +21,10 @@ from muslin.sim.body.interior import masked_face_is_interior
 from muslin.sim.dataset.schema import MASK_GAP_M
 
 wp.set_module_options({"enable_backward": False})
+
+ROOM = 3.0e-3
+"""Metres of free distance that a vertex needs to stay where it is; less than what a masked face must show, since faces and
+vertices have different normals."""
 
 REACH = 0.08
 """Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
@@ -86,7 +90,7 @@ class SelfClearance:
         """Vertices (N, 3) of the collider of a body in one pose, metres."""
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals)
-        gap = MASK_GAP_M
+        gap = ROOM
         inwards = np.where(free < 0.0, 0.5 * gap - free, 0.5 * np.maximum(gap - free, 0.0))
         moved = inwards > 0.0
         if not moved.any():
@@ -105,6 +109,6 @@ class SelfClearance:
         self._points.assign(vertices.astype(np.float32))
         self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()
-        args = [self._mesh.id, self._points, self._normals, MASK_GAP_M, REACH, self._free]
+        args = [self._mesh.id, self._points, self._normals, ROOM, REACH, self._free]
         wp.launch(free_distance, len(vertices), args, device=self.device)
         return self._free.numpy().astype(np.float64)

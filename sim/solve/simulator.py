@@ -32,7 +32,7 @@ from muslin.sim.solve.linear import LinearSystem
 class SolverSettings:
     """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m: largest
     Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton once the
-    collider has arrived, `max_advances` before; `max_move` m an iteration; `linear_tolerance` of
+    collider has arrived, `max_advances` before, with `relaxations` in between where the way was short; `max_move` m an iteration; `linear_tolerance` of
     `muslin.sim.solve.conjugate_gradients`."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
@@ -41,7 +41,8 @@ class SolverSettings:
     tolerance: float = 2.0e-4
     min_iterations: int = 2
     max_iterations: int = 8
-    max_advances: int = 40
+    max_advances: int = 30
+    relaxations: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
     linear_tolerance: float = 0.1
@@ -177,7 +178,7 @@ class ClothSimulator:
         if self._minimise(goal, dt, inertia, friction, pin_targets, report):
             return
         if splits == 0:
-            blocked = self.remaining.numpy()[self.cloth.num_vertices :]
+            blocked = goal - self.collider_vertices
             worst = int(np.argmax(np.linalg.norm(blocked, axis=1)))
             raise SimulationError(
                 f"the collider cannot move on without touching the cloth: its vertex {worst} is still "
@@ -209,16 +210,17 @@ class ClothSimulator:
         self._set_inertia(begin[:n], dt, inertia, pin_targets)
         remaining = np.zeros_like(begin)
         remaining[n:] = goal - begin[n:]
-        moving = bool(np.abs(remaining).max(initial=0.0) > 0.0)
+        arrived = not np.abs(remaining).max(initial=0.0) > 0.0
         fraction = 1.0
-        iterations = advances = 0
+        iterations = advances = relaxing = 0
         while True:
-            self.remaining.assign(remaining * fraction)
+            moving = not arrived and relaxing == 0
+            self.remaining.assign(remaining * (fraction if moving else 0.0))
             self._assemble(1.0 / dt)
             report.linear += self.linear.solve(self.gradient, self.p, s.linear_tolerance, s.max_linear_iterations)
             report.newton += 1
             p = self.p.numpy()
-            p[n:] = remaining[n:] * fraction
+            p[n:] = remaining[n:] * (fraction if moving else 0.0)
             size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
             if not np.isfinite(size):
                 raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
@@ -231,11 +233,16 @@ class ClothSimulator:
                 fraction *= 1.0 - safe
                 advances += 1
                 if safe >= 1.0 or fraction < 1e-9:
-                    moving = False
+                    fraction, arrived = 0.0, True
                 elif advances >= s.max_advances:
                     return False
+                # A short way means that something is squeezed: let it give way before the collider goes on.
+                relaxing = s.relaxations if safe < 0.5 else 0
             else:
                 step = self._line_search(safe, 1.0 / dt)
+                relaxing -= 1
+                if not arrived:
+                    continue
                 iterations += 1
                 report.last_move = step * limit * size
                 report.converged = report.last_move < s.tolerance
