@@ -47,6 +47,8 @@ def clean_partial(root: Path) -> None:
     """Remove what a killed writer left half-written."""
     for entry in (root / PARTIAL).iterdir():
         shutil.rmtree(entry)
+    for file in root.glob(".*.tmp"):
+        file.unlink()
 
 
 def write_sample(root: Path, sample: Sample) -> bool:

@@ -94,9 +94,12 @@ def test_partial_samples_are_not_samples_and_are_cleaned(root: Path) -> None:
     half = root / PARTIAL / "sheet-123.zarr"
     half.mkdir()
     (half / "zarr.json").write_text("{")
+    torn = root / ".index.parquet.123.tmp"
+    torn.write_bytes(b"PAR1")
     assert store.stored_ids(root) == []
     store.clean_partial(root)
     assert not half.exists()
+    assert not torn.exists()
 
 
 @pytest.mark.parametrize("name", ["positions", "faces", "panel_vertices", "obstacle_vertices"])
