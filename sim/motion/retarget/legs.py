@@ -16,7 +16,9 @@ from muslin.sim.motion.skeleton import JOINT, forward_kinematics, global_rotatio
 
 Array = NDArray[np.float64]
 
-_LONGEST = 0.999  # of the stretched leg: the knee keeps a bend, and with it a direction to bend in
+_LONGEST = 0.9995  # of the stretched leg: the knee keeps a bend, and with it a direction to bend in
+_SOFT_FROM = 0.98  # of the stretched leg: from here a target is approached ever more slowly
+_HINGE = 0.3  # sine of the knee angle at which the thigh's axis counts as much as the leg's own plane
 
 
 def reach(poses: Array, translations: Array, rest_joints: ArrayLike, side: str, ankle: Array) -> Array:
@@ -32,12 +34,13 @@ def reach(poses: Array, translations: Array, rest_joints: ArrayLike, side: str, 
     thigh, shin = knee - hip, old - knee
     upper, lower = np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)
     wanted = ankle - hip
-    length = np.clip(np.linalg.norm(wanted, axis=1), np.abs(upper - lower) * 1.01, (upper + lower) * _LONGEST)
+    length = _softened(np.linalg.norm(wanted, axis=1), upper + lower)
+    length = np.maximum(length, np.abs(upper - lower) * 1.01)
 
-    axis = np.cross(thigh, shin)
-    sideways = rotate(world[:, 0], np.array([1.0, 0.0, 0.0]))
-    # A straight leg bends about the body's own sideways axis, knee forward.
-    axis += 1e-3 * (upper * lower)[:, None] * sideways
+    # A bent leg bends on in its own plane; the straighter it is, the more about the thigh's sideways axis, so
+    # that a captured knee that is straight, or bent backwards by an error, bends forwards.
+    axis = np.cross(thigh, shin) / (upper * lower)[:, None]
+    axis += _HINGE * rotate(world[:, hip_j], np.array([1.0, 0.0, 0.0]))
     down = thigh / upper[:, None]
     back = np.cross(axis, down)
     back /= np.linalg.norm(back, axis=1, keepdims=True)
@@ -53,3 +56,14 @@ def reach(poses: Array, translations: Array, rest_joints: ArrayLike, side: str, 
     result[:, knee_j] = axis_angle_from_quaternion(multiply(conjugate(new_hip), new_knee))
     result[:, ankle_j] = axis_angle_from_quaternion(multiply(conjugate(new_knee), world[:, ankle_j]))
     return result
+
+
+def _softened(length: Array, stretched: Array) -> Array:
+    """`length`, bent towards `stretched` with slope 1 at first and none at last.
+
+    Near the stretched leg the knee angle goes as the square root of what is missing: a hard limit would make
+    the knee snap as the target comes back into reach.
+    """
+    start, room = _SOFT_FROM * stretched, (_LONGEST - _SOFT_FROM) * stretched
+    over = np.maximum(length - start, 0.0)
+    return np.where(over > 0.0, start + room * (1.0 - np.exp(-over / room)), length)
