@@ -39,8 +39,8 @@ def test_clip_does_not_sink_into_the_floor(name: str) -> None:
     motion = load_motion(name)
     frames = np.linspace(0, motion.num_frames - 1, 12).astype(int)
     chosen = Motion(name, motion.poses[frames], motion.translations[frames], motion.fps, "")
-    # The quantum of stored angles moves a toe by up to half a millimetre.
-    assert lowest_heights(chosen, BODY).min() > -1e-3
+    # The quantum of stored angles moves a toe by a tenth of a millimetre.
+    assert lowest_heights(chosen, BODY).min() > -2e-4
 
 
 @pytest.mark.parametrize("name", ["walk", "dance_a", "run"])
