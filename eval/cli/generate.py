@@ -25,7 +25,7 @@ def generate(
     Examples:
       muslin generate scenes/demo.toml --out out/demo
       muslin generate scenes/demo.toml --out out/demo --workers 8
-      muslin generate scenes/demo.toml --out out/coarse --set scene.garment.resolution=403
+      muslin generate scenes/demo.toml --out out/coarse --set scene.garment.edge_length=0.03
     """
     from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.config import load_config

@@ -21,7 +21,7 @@ def simulate(
     \b
     Examples:
       muslin simulate scenes/tshirt_walk.toml --out out/walk
-      muslin simulate scenes/cloth_on_sphere.toml --out out/sphere --set garment.resolution=1400
+      muslin simulate scenes/cloth_on_sphere.toml --out out/sphere --set garment.edge_length=0.03
       muslin simulate scenes/dress_dance.toml --out out/dance --device cuda:0
     """
     from muslin.sim.scene import load_scene

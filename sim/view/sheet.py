@@ -22,12 +22,13 @@ def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def captioned(picture: np.ndarray, caption: str) -> np.ndarray:
-    """The picture with a line of text on its upper edge."""
-    image = Image.fromarray(picture)
-    ImageDraw.Draw(image).text(
-        (image.width / 2, CAPTION_HEIGHT / 2 + 2), caption, fill=DARK, font=font(14), anchor="mm"
-    )
-    return np.asarray(image)
+    """The picture below a strip, in the colour of its upper left corner, that holds a line of text."""
+    height, width = picture.shape[:2]
+    canvas = Image.new("RGB", (width, height + CAPTION_HEIGHT), tuple(int(c) for c in picture[0, 0]))
+    canvas.paste(Image.fromarray(picture), (0, CAPTION_HEIGHT))
+    place = (width / 2, CAPTION_HEIGHT / 2 + 1)
+    ImageDraw.Draw(canvas).text(place, caption, fill=DARK, font=font(14), anchor="mm")
+    return np.asarray(canvas)
 
 
 def contact_sheet(

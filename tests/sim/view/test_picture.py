@@ -20,7 +20,7 @@ from muslin.sim.view.movie import frame_choice, gif_bytes, write_movie
 from muslin.sim.view.picture import picture, rotation_matrix, sample_cameras
 from muslin.sim.view.rays import cast, lit_share
 from muslin.sim.view.render import render
-from muslin.sim.view.sheet import GAP, contact_sheet
+from muslin.sim.view.sheet import CAPTION_HEIGHT, GAP, contact_sheet
 from muslin.sim.view.window import require_display
 
 BALL = trimesh.creation.icosphere(4)
@@ -187,6 +187,9 @@ def test_contact_sheet_places_pictures_in_rows():
     assert grid.shape == (20 + GAP, 24 + 2 * GAP, 3)
     assert grid[5, 4, 0] == 0
     assert grid[15 + GAP, 12 + GAP, 0] == 4
+    titled = contact_sheet(pictures, 5, ["a"] * 5)
+    assert titled.shape == (10 + CAPTION_HEIGHT, 40 + 4 * GAP, 3)
+    assert (titled[CAPTION_HEIGHT:, :8] == 0).all()
     with pytest.raises(InputError):
         contact_sheet([], 2)
 
