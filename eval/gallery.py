@@ -6,12 +6,14 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.view.camera import Camera
@@ -52,7 +54,13 @@ def _drawn(shots: Sequence[Shot], workers: int) -> Iterator[np.ndarray]:
         yield from map(_draw, shots)
         return
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(_draw, shots, chunksize=2)
+        try:
+            yield from pool.map(_draw, shots, chunksize=2)
+        except BrokenProcessPool as error:
+            raise InputError(
+                "a drawing process died, most often because memory ran out: "
+                f"run again with fewer --workers than {workers}"
+            ) from error
 
 
 def _draw(shot: Shot) -> np.ndarray:
