@@ -73,8 +73,8 @@ class SolverTable(_Table):
     dt: Annotated[float, Field(ge=1e-3, le=0.05)] = 1.0 / 60.0
     damping: Annotated[float, Field(ge=0.0, le=1.0)] = 2.0e-3
     drag: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
-    tolerance: Annotated[float, Field(ge=1e-7, le=1e-2)] = 2.0e-4
-    max_iterations: Annotated[int, Field(ge=1, le=200)] = 8
+    tolerance: Annotated[float, Field(ge=1e-7, le=1e-2)] = 5.0e-4
+    max_iterations: Annotated[int, Field(ge=1, le=200)] = 4
     contact_range: Annotated[float, Field(ge=5e-4, le=1e-2)] = 2.0e-3
     contact_stiffness: Positive = 1.0
     settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 150

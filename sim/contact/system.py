@@ -24,10 +24,11 @@ from muslin.sim.solve.block_matrix import BlockMatrix
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """`range` m: distance below which the barrier acts; `stiffness` J/m^2; friction coefficients; `slip_speed`
+    """`range` m: distance below which the barrier acts; `margin` m that a search looks further; `stiffness` J/m^2; friction coefficients; `slip_speed`
     m/s below which friction sticks smoothly."""
 
     range: float = 2.0e-3
+    margin: float = 2.0e-3
     stiffness: float = 1.0
     friction_body: float = 0.3
     friction_cloth: float = 0.3
@@ -118,6 +119,7 @@ class ContactSystem:
         self.active = wp.zeros(1, dtype=wp.int32, device=device)
         self.nearest = wp.zeros(1, dtype=wp.float64, device=device)
         self._searches = 0
+        self._travelled = 0.0
         self.friction = FrictionModel()
         self.num_friction = 0
         self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
@@ -145,16 +147,29 @@ class ContactSystem:
         )
         self.body_edges.on.assign(alive.astype(np.int32))
 
+    def cover(self, x: wp.array, p: wp.array, reach: float) -> None:
+        """Make sure that every pair that may come within range on the way from x to x + p is listed.
+
+        `reach` is the largest move |p_i|, metres. A search looks `margin` further than it must; while the moves since
+        then add up to no more than half of that, its list still holds.
+        """
+        if 2.0 * (self._travelled + reach) <= self.settings.margin:
+            self._travelled += reach
+        else:
+            self.search(x, p)
+
     def search(self, x: wp.array, p: wp.array) -> None:
-        """List every pair that may come within range on the way from x to x + p."""
+        """List every pair that may come within range and `margin` on the way from x to x + p."""
+        self._travelled = 0.0
         n = self.num_cloth + self.num_collider
         wp.launch(sweep_vertices, n, [x, p, self.vertex_low, self.vertex_high], device=self.device)
         rebuild = self._searches % 50 == 0
         self._searches += 1
         for elements in (self.cloth_faces, self.cloth_edges, self.body_faces, self.body_edges):
             elements.update(self.vertex_low, self.vertex_high, rebuild)
-        low = self.vertex_low.numpy()[: self.num_cloth].min(axis=0) - self.settings.range
-        high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + self.settings.range
+        radius = self.settings.range + self.settings.margin
+        low = self.vertex_low.numpy()[: self.num_cloth].min(axis=0) - radius
+        high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + radius
         for pairs in self.lists:
             for _ in range(2):
                 self._launch_search(pairs, wp.vec3d(*low), wp.vec3d(*high))
@@ -166,7 +181,7 @@ class ContactSystem:
 
     def _launch_search(self, out: _PairList, low: wp.vec3d, high: wp.vec3d) -> None:
         out.count.zero_()
-        radius = self.settings.range
+        radius = self.settings.range + self.settings.margin
         bounds = [self.vertex_low, self.vertex_high]
         has_body = self.body_faces.bvh is not None
         if out.is_edge_edge:

@@ -38,9 +38,9 @@ class SolverSettings:
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     damping: float = 2.0e-3
     drag: float = 0.5
-    tolerance: float = 2.0e-4
+    tolerance: float = 5.0e-4
     min_iterations: int = 2
-    max_iterations: int = 8
+    max_iterations: int = 4
     max_advances: int = 30
     relaxations: int = 2
     max_move: float = 0.03
@@ -226,7 +226,8 @@ class ClothSimulator:
                 raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
             limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
             self.p.assign(p * limit)
-            self.contact.search(self.x, self.p)
+            reach = limit * float(np.sqrt((p**2).sum(axis=1).max()))
+            self.contact.cover(self.x, self.p, reach)
             safe = self.contact.largest_step(self.x, self.p, self._scalar)
             if moving:
                 self._move(safe)
