@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
-from muslin.sim.contact.barrier import PairMeasure, active_pairs, barrier_derivatives, barrier_value
+from muslin.sim.contact.barrier import PairMeasure, active_pairs, barrier_derivatives, barrier_value, guard_pairs
 from muslin.sim.contact.broad_phase import (
     edge_edge_candidates,
     element_bounds,
@@ -237,6 +237,13 @@ class ContactSystem:
         if self.num_friction:
             args = [x, start, remaining, self.friction, gradient, matrix]
             wp.launch(friction_derivatives, self.num_friction, args, device=self.device)
+
+    def add_guards(self, x: wp.array, p: wp.array, gradient: wp.array, matrix: BlockMatrix) -> None:
+        """Warn the Newton system of the pairs that its last direction p would have brought together."""
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, p, pairs.pairs, pairs.is_edge_edge, self.measure, gradient, matrix]
+                wp.launch(guard_pairs, pairs.length, args, device=self.device)
 
     def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
         """Freeze the contacts at x, which must be within reach of the last search, for this step's friction."""

@@ -32,7 +32,7 @@ from muslin.sim.solve.linear import LinearSystem
 class SolverSettings:
     """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m: largest
     Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton once the
-    collider has arrived, `max_advances` before, with `relaxations` in between where the way was short; `max_move` m an iteration; `linear_tolerance` of
+    collider has arrived, `max_advances` before, with `relaxations` in between where the way was short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration; `linear_tolerance` of
     `muslin.sim.solve.conjugate_gradients`."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
@@ -43,6 +43,7 @@ class SolverSettings:
     max_iterations: int = 4
     max_advances: int = 30
     relaxations: int = 2
+    guards: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
     linear_tolerance: float = 0.1
@@ -217,18 +218,15 @@ class ClothSimulator:
             moving = not arrived and relaxing == 0
             self.remaining.assign(remaining * (fraction if moving else 0.0))
             self._assemble(1.0 / dt)
-            report.linear += self.linear.solve(self.gradient, self.p, s.linear_tolerance, s.max_linear_iterations)
-            report.newton += 1
-            p = self.p.numpy()
-            p[n:] = remaining[n:] * (fraction if moving else 0.0)
-            size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
-            if not np.isfinite(size):
-                raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
-            limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
-            self.p.assign(p * limit)
-            reach = limit * float(np.sqrt((p**2).sum(axis=1).max()))
-            self.contact.cover(self.x, self.p, reach)
-            safe = self.contact.largest_step(self.x, self.p, self._scalar)
+            share = fraction if moving else 0.0
+            for guard in range(s.guards + 1):
+                size, limit = self._direction(remaining[n:] * share, moving, report)
+                safe = self.contact.largest_step(self.x, self.p, self._scalar)
+                if safe >= 0.5 or guard == s.guards:
+                    break
+                self.contact.add_guards(self.x, self.p, self.gradient, self.linear.matrix)
+                if not self.linear.extras_fit():
+                    break
             if moving:
                 self._move(safe)
                 fraction *= 1.0 - safe
@@ -251,6 +249,27 @@ class ClothSimulator:
                     break
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
         return True
+
+    def _direction(
+        self, collider_move: NDArray[np.float64], moving: bool, report: StepReport
+    ) -> tuple[float, float]:
+        """Solve for the next move p of cloth and collider and list the contacts on its way.
+
+        Returns the largest move of a cloth vertex before p was scaled, and the scale.
+        """
+        s = self.settings
+        n = self.cloth.num_vertices
+        report.linear += self.linear.solve(self.gradient, self.p, s.linear_tolerance, s.max_linear_iterations)
+        report.newton += 1
+        p = self.p.numpy()
+        p[n:] = collider_move
+        size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
+        if not np.isfinite(size):
+            raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
+        limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
+        self.p.assign(p * limit)
+        self.contact.cover(self.x, self.p, limit * float(np.sqrt((p**2).sum(axis=1).max())))
+        return size, limit
 
     def _set_inertia(
         self, begin: NDArray[np.float64], dt: float, inertia: bool, pin_targets: NDArray[np.float64] | None
