@@ -55,7 +55,6 @@ class WornGarment:
         start = place(mesh, model, beta, body)
         bones = shrunk_body(model, beta, body, LEAST_GIRTH)
         self.sim = ClothSimulator(cloth, start, bones, model.faces, contact, solver, device)
-        self.sim.contact.set_collider_area(body)
         grow_body(self.sim, model, beta, self.clearance.collider(body), tick)
 
     def body(self) -> NDArray[np.float64]:

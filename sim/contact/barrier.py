@@ -4,7 +4,7 @@ For a pair at distance d < dhat, s = d / dhat,
 
     E = kappa A m B(s),   B(s) = -(s - 1)^2 ln s,
 
-kappa in J/m^2, A the area in m^2 the pair stands for, m = 1 for vertex-triangle pairs. For edge-edge pairs
+kappa in J/m^2, A the area of cloth in m^2 the pair stands for, m = 1 for vertex-triangle pairs. For edge-edge pairs
 m mollifies near-parallel edges, whose closest points jump: with c = |e1 x e2|^2 and
 c0 = 1e-3 |e1|^2 |e2|^2 at rest, m = (2 - c / c0) c / c0 below c0.
 The Hessian keeps the positive semi-definite part m B'' grad d grad d^T.
@@ -23,7 +23,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class PairMeasure:
-    """Rest measures of the joint vertex array: vertex area, m^2; per vertex-pair quantities are looked up by edge."""
+    """`vertex_area` (V,) of the cloth, m^2; `range_` dhat, m; `stiffness` kappa, J/m^2."""
 
     vertex_area: wp.array(dtype=wp.float64)
     num_cloth: int
@@ -60,11 +60,21 @@ def mollifier(is_edge_edge: bool, rest: wp.float64, x0: wp.vec3d, x1: wp.vec3d, 
 
 
 @wp.func
-def pair_area(is_edge_edge: bool, pair: wp.vec4i, area: wp.array(dtype=wp.float64)) -> wp.float64:
-    """Area a pair stands for. A vertex-face and an edge-edge pair each take half of what they touch."""
+def pair_area(is_edge_edge: bool, pair: wp.vec4i, measure: PairMeasure) -> wp.float64:
+    """Area of cloth that a pair stands for: that of its vertices on the cloth, shared among their pairs.
+
+    The collider's own areas do not count: a fingertip of tiny triangles must push as hard as a back.
+    """
+    area = measure.vertex_area
+    n = measure.num_cloth
     if is_edge_edge:
         # An edge owns about a third of the area around each of its ends.
-        return wp.float64(1.0 / 12.0) * (area[pair[0]] + area[pair[1]] + area[pair[2]] + area[pair[3]])
+        own = area[pair[0]] + area[pair[1]]
+        if pair[2] >= n:
+            return own * wp.float64(1.0 / 6.0)
+        return (own + area[pair[2]] + area[pair[3]]) * wp.float64(1.0 / 12.0)
+    if pair[0] >= n:
+        return (area[pair[1]] + area[pair[2]] + area[pair[3]]) * wp.float64(1.0 / 6.0)
     return wp.float64(0.5) * area[pair[0]]
 
 
@@ -97,7 +107,7 @@ def barrier_value(
     s = d / measure.range_
     if s < wp.float64(1.0):
         m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)[0]
-        scale = measure.stiffness * pair_area(is_edge_edge, pair, measure.vertex_area)
+        scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
         wp.atomic_add(energy, 0, scale * m * barrier(s)[0])
 
 
@@ -132,7 +142,7 @@ def barrier_derivatives(
         return
     wp.atomic_add(active, 0, 1)
     m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)
-    scale = measure.stiffness * pair_area(is_edge_edge, pair, measure.vertex_area)
+    scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
     b = barrier(s)
     n = r / d
     force = scale * m[0] * b[1] / measure.range_
@@ -203,7 +213,7 @@ def guard_pairs(
             carried += a
     if approach >= wp.float64(-0.7) * d:
         return
-    area = pair_area(is_edge_edge, pair, measure.vertex_area)
+    area = pair_area(is_edge_edge, pair, measure)
     spring = wp.float64(10.0) * measure.stiffness * area / (measure.range_ * measure.range_)
     along = n * (spring * (carried + wp.float64(0.5) * d))
     block = wp.outer(n * spring, n)
@@ -246,7 +256,7 @@ def active_pairs(
     slot = wp.atomic_add(count, 0, 1)
     if slot < out_pairs.shape[0]:
         m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)[0]
-        scale = measure.stiffness * pair_area(is_edge_edge, pair, measure.vertex_area)
+        scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
         out_pairs[slot] = pair
         out_weights[slot] = w
         out_normal[slot] = r / d

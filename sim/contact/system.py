@@ -81,14 +81,14 @@ class ContactSystem:
         self,
         cloth: ClothModel,
         collider_faces: NDArray[np.int32],
-        collider_rest: NDArray[np.float64],
+        num_collider: int,
         settings: ContactSettings,
         device: str,
     ) -> None:
         self.settings = settings
         self.device = device
         self.num_cloth = cloth.num_vertices
-        self.num_collider = len(collider_rest)
+        self.num_collider = num_collider
         n = self.num_cloth + self.num_collider
         self.collider_faces = collider_faces
         body_faces = collider_faces.astype(np.int32) + self.num_cloth
@@ -108,9 +108,8 @@ class ContactSystem:
         self.vertex_low = wp.zeros(n, dtype=wp.vec3d, device=device)
         self.vertex_high = wp.zeros(n, dtype=wp.vec3d, device=device)
 
-        area = np.concatenate([cloth.vertex_area, _vertex_areas(collider_rest, collider_faces)])
         self.measure = PairMeasure()
-        self.measure.vertex_area = wp.array(area, dtype=wp.float64, device=device)
+        self.measure.vertex_area = wp.array(cloth.vertex_area, dtype=wp.float64, device=device)
         self.measure.num_cloth = self.num_cloth
         self.measure.range_ = settings.range
         self.measure.stiffness = settings.stiffness
@@ -124,12 +123,6 @@ class ContactSystem:
         self.num_friction = 0
         self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
         self._reserve_friction(8 * self.num_cloth)
-
-    def set_collider_area(self, vertices: NDArray[np.float64]) -> None:
-        """Take the areas that contacts are weighted by from the collider in this shape, (N, 3) metres."""
-        area = self.measure.vertex_area.numpy()
-        area[self.num_cloth :] = _vertex_areas(vertices, self.collider_faces)
-        self.measure.vertex_area.assign(area)
 
     def mask(self, face_on: NDArray[np.bool_]) -> None:
         """Switch collider faces on or off; edges and vertices follow the faces around them."""
@@ -263,6 +256,21 @@ class ContactSystem:
         self._list_active(x)
         return float(self.nearest.numpy()[0])
 
+    def tightest(self, x: wp.array) -> str:
+        """The closest listed pair in words: distance, vertices, place."""
+        self._list_active(x)
+        if self.num_friction == 0:
+            return "no contact"
+        count = self.num_friction
+        pairs = self.friction.pairs.numpy()[:count]
+        points = x.numpy()[pairs]
+        distance = np.linalg.norm((self.friction.weights.numpy()[:count, :, None] * points).sum(axis=1), axis=1)
+        k = int(np.argmin(distance))
+        cloth = [int(v) for v in pairs[k] if v < self.num_cloth]
+        collider = [int(v) - self.num_cloth for v in pairs[k] if v >= self.num_cloth]
+        where = ", ".join(f"{value:.3f}" for value in points[k].mean(axis=0))
+        return f"{distance[k] * 1e3:.4f} mm between cloth {cloth} and collider {collider or 'none'} at ({where})"
+
     def _list_active(self, x: wp.array) -> None:
         self._friction_count.zero_()
         self.nearest.fill_(float("inf"))
@@ -279,10 +287,3 @@ class ContactSystem:
         self.friction.weights = wp.zeros(capacity, dtype=wp.vec4d, device=self.device)
         self.friction.normal = wp.zeros(capacity, dtype=wp.vec3d, device=self.device)
         self.friction.force = wp.zeros(capacity, dtype=wp.float64, device=self.device)
-
-
-def _vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    if len(faces) == 0:
-        return np.zeros(len(vertices))
-    area = 0.5 * igl.doublearea(vertices.astype(np.float64), faces.astype(np.int64))
-    return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))

@@ -83,7 +83,9 @@ class ClothSimulator:
         self.device = device
         n = cloth.num_vertices
         self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
-        self.contact = ContactSystem(cloth, collider_faces, collider_vertices, contact or ContactSettings(), device)
+        self.contact = ContactSystem(
+            cloth, collider_faces, len(collider_vertices), contact or ContactSettings(), device
+        )
         self.linear = LinearSystem(cloth, device)
         total = n + len(collider_vertices)
         vec = {"dtype": wp.vec3d, "device": device}
@@ -179,12 +181,11 @@ class ClothSimulator:
         if self._minimise(goal, dt, inertia, friction, pin_targets, report):
             return
         if splits == 0:
-            blocked = goal - self.collider_vertices
-            worst = int(np.argmax(np.linalg.norm(blocked, axis=1)))
+            share = np.linalg.norm(goal - self.collider_vertices) / np.linalg.norm(goal - saved_x[self.cloth.num_vertices :])
             raise SimulationError(
-                f"the collider cannot move on without touching the cloth: its vertex {worst} is still "
-                f"{np.linalg.norm(blocked[worst]) * 1e3:.2f} mm short after {self.settings.max_splits} halvings of "
-                f"the step; use a smaller time step, a looser garment or a slower motion"
+                f"the collider cannot move on without touching the cloth: {share:.0%} of the way is left after "
+                f"{self.settings.max_splits} halvings of the step; closest are {self.contact.tightest(self.x)}; "
+                "use a smaller time step, a looser garment or a slower motion"
             )
         self.restore(saved_x, saved_v)
         report.splits += 1
