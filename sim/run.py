@@ -25,6 +25,7 @@ from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.material import load_fabric
+from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import load_motion
 from muslin.sim.motion.grounding import fit_to_body
 from muslin.sim.motion.lead_in import lead_in
@@ -189,6 +190,8 @@ def _sequence(
     beta = _beta(scene, worn.model)
     clip = fit_to_body(load_motion(m.clip), worn.model, beta)
     clip = clip.clip(m.start, clip.duration if m.end is None else m.end)
+    if m.spread_arms:
+        clip, _ = spread_arms(clip, worn.model, beta)
     substeps = int(np.ceil(1.0 / (m.fps * scene.solver.dt) - 1e-9))
     step_rate = m.fps * substeps
     way_in = lead_in(clip, LEAD_IN_SECONDS, step_rate)

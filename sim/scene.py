@@ -51,12 +51,16 @@ class ColliderTable(_Table):
 
 
 class MotionTable(_Table):
-    """`clip` by name or AMASS file, from `start` to `end` seconds of it, stored at `fps` frames a second."""
+    """`clip` by name or AMASS file, from `start` to `end` seconds of it, stored at `fps` frames a second.
+
+    `spread_arms` turns arms that sink into this body's trunk or thighs outwards, as `muslin.sim.motion.arms` tells.
+    """
 
     clip: str
     start: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
     end: Positive | None = None
     fps: Annotated[float, Field(gt=0.0, le=240.0)] = 30.0
+    spread_arms: bool = True
 
 
 class FabricScale(_Table):
