@@ -86,13 +86,20 @@ class SolverTable(_Table):
 
 
 class ExpectTable(_Table):
-    """What must hold of the result; `muslin simulate` checks it. Intersections must always be zero."""
+    """What must hold of the result; `muslin simulate` checks it. Intersections must always be zero.
+
+    At most: `largest_stretch`, the largest principal stretch in any frame, and `residual`, the force left on a drape as
+    a share of its weight. At least: `smallest_distance`, metres. From low to high: `lowest_point` and `highest_point`,
+    heights of the cloth in metres over all frames. Exactly: `frames`, and `at_rest`, whether a drape came to rest.
+    """
 
     largest_stretch: Positive | None = None
     smallest_distance: Positive | None = None
     residual: Positive | None = None
     lowest_point: tuple[Finite, Finite] | None = None
+    highest_point: tuple[Finite, Finite] | None = None
     frames: Annotated[int, Field(ge=1)] | None = None
+    at_rest: bool | None = None
 
 
 class Scene(_Table):

@@ -74,8 +74,8 @@ def root(
       muslin verify out/demo                             count its intersections again
       muslin report out/demo --html out/demo/report.html see it
       muslin eval out/prediction out/demo --html eval.html
-    Every command tells more: muslin COMMAND --help. Exit codes: 1 verification failed, 2 wrong input,
-    3 the simulation could not go on.
+    Every command tells more: muslin COMMAND --help. Exit codes: 1 verification or an expectation
+    failed, 2 wrong input, 3 the simulation could not go on.
     """
 
 

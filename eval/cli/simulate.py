@@ -18,6 +18,8 @@ def simulate(
 ) -> None:
     """Simulate one scene and store it, with its certificate, as a dataset of one sample.
 
+    What the result violates of the scene's [expect] table is listed, and the exit code is then 1.
+
     \b
     Examples:
       muslin simulate scenes/tshirt_walk.toml --out out/walk
@@ -32,6 +34,7 @@ def simulate(
 
     from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.reader import write_dataset
+    from muslin.sim.expect import check_expectations
     from muslin.sim.run import simulate as run
 
     with progress_bar("simulate") as update:
@@ -44,3 +47,8 @@ def simulate(
         f"{found.cloth_cloth_intersections} cloth-cloth and {found.cloth_body_intersections} cloth-body "
         f"intersections, {found.seconds:.1f} s"
     )
+    violations = check_expectations(loaded, sample)
+    for violation in violations:
+        typer.echo(f"muslin: {scene}: {violation}", err=True)
+    if violations:
+        raise typer.Exit(1)
