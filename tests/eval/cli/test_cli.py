@@ -249,3 +249,16 @@ def test_simulated_sample_is_stored(tmp_path, make_sample, monkeypatch):
     stored = open_dataset(tmp_path / "out")["made"]
     assert np.array_equal(stored.positions, sample.positions)
     refused("simulate", scene, "--out", tmp_path / "out", says="not an empty folder")
+
+
+def test_violated_expectations_are_listed_with_exit_code_one(tmp_path, make_sample, monkeypatch):
+    from muslin.sim import run
+
+    sample = make_sample("made")
+    monkeypatch.setattr(run, "simulate", lambda scene, device, progress: sample)
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[body]\nmodel = "female"\n[expect]\nsmallest_distance = 0.02\nframes = 1\n')
+    result = muslin("simulate", scene, "--out", tmp_path / "out", code=1)
+    assert "expect.smallest_distance: measured 0.01 m, allowed is at least 0.02 m" in result.stderr
+    assert "frames:" not in result.stderr
+    assert len(open_dataset(tmp_path / "out")) == 1, "what was computed is kept, to be looked at"
