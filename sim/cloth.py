@@ -43,10 +43,11 @@ class ClothModel:
 
     @cached_property
     def pattern(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Block compressed rows (offsets (V+1,), columns (nnz,)) of faces and hinges, sorted, with diagonal."""
+        """Sorted block rows of faces, hinges and diagonal: offsets (V + 1,), columns (nnz,)."""
         pairs = [np.stack([self.faces[:, a], self.faces[:, b]], 1) for a in range(3) for b in range(3)]
         pairs += [np.stack([self.hinges[:, a], self.hinges[:, b]], 1) for a in range(4) for b in range(4)]
-        pairs.append(np.repeat(np.arange(self.num_vertices), 2).reshape(-1, 2))
+        diagonal = np.arange(self.num_vertices, dtype=np.int32)
+        pairs.append(np.stack([diagonal, diagonal], 1))
         keys = np.unique(np.concatenate(pairs).astype(np.int64) @ np.array([self.num_vertices, 1]))
         rows, columns = keys // self.num_vertices, keys % self.num_vertices
         offsets = np.searchsorted(rows, np.arange(self.num_vertices + 1))
@@ -90,7 +91,7 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
         faces=faces,
         edges=edges,
         hinges=hinges,
-        inverse_rest=np.linalg.inv(rest),
+        inverse_rest=np.linalg.inv(rest).astype(np.float64),
         rest_area=area,
         mass=fabric.density * vertex_area,
         vertex_area=vertex_area,
@@ -128,7 +129,7 @@ def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
 def _hinges(
     faces: NDArray[np.int32], edges: NDArray[np.int32], edge_of_corner: NDArray[np.int64]
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-    """Interior edges as (x0, x1, x2, x3), the faces (H, 2) of x2 and x3, and the corner (H, 2) they sit at."""
+    """Interior edges as (x0, x1, x2, x3); the faces (H, 2) of x2 and x3, and the corners (H, 2) they are."""
     num_faces = len(faces)
     order = np.argsort(edge_of_corner, kind="stable")
     counts = np.bincount(edge_of_corner, minlength=len(edges))

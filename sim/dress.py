@@ -1,8 +1,8 @@
-"""Dressing: panels placed around a body shrunk to its bones, sewn, and the body grown back inside the garment.
+"""Dressing: panels sewn around a body shrunk to its bones, and the body grown back inside the garment.
 
-The panels are laid on tubes around torso and arms and joined at once; their seam vertices sit halfway between where
-the two panels would have them, so the first relaxation is the seams contracting. The body starts as its skeleton,
-which every garment encloses, and grows to its true shape while contact keeps the cloth outside.
+The panels are laid on tubes around torso and arms and joined at once; their seam vertices sit halfway between
+where the two panels would have them, so the first relaxation is the seams contracting. The body starts as its
+skeleton, which every garment encloses, and grows to its true shape while contact keeps the cloth outside.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def grow_body(
 ) -> None:
     """Let the seams of a placed garment contract, then grow the body from its skeleton to `vertices`.
 
-    `sim` holds the garment of `place` around `shrunk_body(..., LEAST_GIRTH)`. Weightless and without friction, so
-    that the garment finds its own place on the body.
+    `sim` holds the garment of `place` around `shrunk_body(..., LEAST_GIRTH)`. Weightless and without
+    friction, so that the garment finds its own place on the body.
     """
     sim.set_gravity((0.0, 0.0, 0.0))
     for step in range(RELAX_STEPS + GROW_STEPS):
@@ -86,7 +86,7 @@ def place(
 ) -> NDArray[np.float64]:
     """Positions (V, 3) of the sewn garment around the body in its rest pose.
 
-    Panels are told by name: `front`, `back`, `sleeve_left`, `sleeve_right`, in the frames of the `tee` design.
+    Panels are told by name: `front`, `back`, `sleeve_left`, `sleeve_right`, in the frames of `tee`.
     """
     unknown = set(mesh.panel_names) - {"front", "back", "sleeve_left", "sleeve_right"}
     if unknown:
@@ -138,10 +138,14 @@ def _around_torso(flat: NDArray[np.float64], side: float) -> NDArray[np.float64]
     neck = np.abs(x[y > y.max() - 1e-6]).max()
     shoulder_line = -np.maximum(np.abs(x) - neck, 0.0) * np.tan(np.radians(20.0))
     rounding = np.sqrt(np.clip((shoulder_line - y) / SHOULDER_ROUNDING, 0.0, 1.0))
-    return np.stack([side * a * np.sin(angle), y, side * TORSO_DEPTH_TO_WIDTH * a * np.cos(angle) * rounding], axis=1)
+    return np.stack(
+        [side * a * np.sin(angle), y, side * TORSO_DEPTH_TO_WIDTH * a * np.cos(angle) * rounding], axis=1
+    )
 
 
-def _around_arm(flat: NDArray[np.float64], shoulder: NDArray[np.float64], tip: float, side: float) -> NDArray[np.float64]:
+def _around_arm(
+    flat: NDArray[np.float64], shoulder: NDArray[np.float64], tip: float, side: float
+) -> NDArray[np.float64]:
     x, y = flat.T
     bins = np.linspace(y.min(), y.max(), 15)
     width = np.array([np.abs(x[np.abs(y - b) <= (bins[1] - bins[0])]).max() for b in bins])
@@ -151,5 +155,6 @@ def _around_arm(flat: NDArray[np.float64], shoulder: NDArray[np.float64], tip: f
     angle = np.pi * x / half
     radius = half / np.pi
     return np.stack(
-        [side * (tip - y), shoulder[1] + radius * np.cos(angle), shoulder[2] - side * radius * np.sin(angle)], axis=1
+        [side * (tip - y), shoulder[1] + radius * np.cos(angle), shoulder[2] - side * radius * np.sin(angle)],
+        axis=1,
     )

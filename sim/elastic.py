@@ -7,7 +7,13 @@ import warp as wp
 
 from muslin.sim.cloth import ClothModel, bend_moments
 from muslin.sim.energies.bending import BendModel, bend_angle, bend_derivatives, bend_value
-from muslin.sim.energies.stretch import StretchModel, strainv, stretch_derivatives, stretch_strain, stretch_value
+from muslin.sim.energies.stretch import (
+    StretchModel,
+    strainv,
+    stretch_derivatives,
+    stretch_strain,
+    stretch_value,
+)
 from muslin.sim.solve.block_matrix import BlockMatrix
 
 
@@ -50,23 +56,19 @@ class ElasticEnergy:
 
     def add_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
         rate = self.damping * inverse_dt
-        wp.launch(stretch_value, self.num_faces, [x, self.stretch, self._strain, rate, energy], device=self.device)
-        wp.launch(bend_value, self.num_hinges, [x, self.bend, self._angle, rate, energy], device=self.device)
+        stretch = [x, self.stretch, self._strain, rate, energy]
+        wp.launch(stretch_value, self.num_faces, stretch, device=self.device)
+        bend = [x, self.bend, self._angle, rate, energy]
+        wp.launch(bend_value, self.num_hinges, bend, device=self.device)
 
-    def add_derivatives(self, x: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix) -> None:
+    def add_derivatives(
+        self, x: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix
+    ) -> None:
         rate = self.damping * inverse_dt
-        wp.launch(
-            stretch_derivatives,
-            self.num_faces,
-            [x, self.stretch, self._strain, rate, gradient, matrix.values],
-            device=self.device,
-        )
-        wp.launch(
-            bend_derivatives,
-            self.num_hinges,
-            [x, self.bend, self._angle, rate, gradient, matrix.values],
-            device=self.device,
-        )
+        stretch = [x, self.stretch, self._strain, rate, gradient, matrix.values]
+        wp.launch(stretch_derivatives, self.num_faces, stretch, device=self.device)
+        bend = [x, self.bend, self._angle, rate, gradient, matrix.values]
+        wp.launch(bend_derivatives, self.num_hinges, bend, device=self.device)
 
 
 def principal_stretches(cloth: ClothModel, positions: np.ndarray) -> np.ndarray:

@@ -44,7 +44,9 @@ class Fabric:
         """The same fabric with multiplied density, stretch and bending stiffness (all > 0)."""
         for key, value in {"density": density, "stretch": stretch, "bend": bend}.items():
             if not (np.isfinite(value) and value > 0.0):
-                raise InputError(f"fabric multiplier {key} = {value}: must be a finite number above 0; use 1 for no change")
+                raise InputError(
+                    f"fabric multiplier {key} = {value}: must be a finite number above 0; use 1 for no change"
+                )
         return replace(
             self,
             density=self.density * density,
@@ -88,7 +90,9 @@ def load_fabric(name: str) -> Fabric:
     )
 
 
-def isotropic_fabric(young: float, poisson: float, thickness: float, density: float, name: str = "isotropic") -> Fabric:
+def isotropic_fabric(
+    young: float, poisson: float, thickness: float, density: float, name: str = "isotropic"
+) -> Fabric:
     """St. Venant-Kirchhoff membrane and plate of an isotropic sheet.
 
     Plane stress: s = E h / (1 - nu^2) [(1 - nu) G + nu tr(G) I], so c11 = c22 = E h / (2 (1 - nu^2)),

@@ -1,9 +1,9 @@
 """Coming to rest: implicit steps with kinetic damping, until neither force nor motion is left.
 
-Velocities are set to zero whenever the kinetic energy has passed a peak (Barnes 1999, "Form finding and analysis of
-tension structures by dynamic relaxation"). A force residual alone misleads: cloth that slides along a soft curved
-valley shows little force a centimetre from where it ends. So the rule asks for a small residual and for small moves
-over several steps.
+Velocities are set to zero whenever the kinetic energy has passed a peak (Barnes 1999, "Form finding and
+analysis of tension structures by dynamic relaxation"). A force residual alone misleads: cloth that slides
+along a soft curved valley shows little force a centimetre from where it ends. So the rule asks for a small
+residual and for small moves over several steps.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ STILL_STEPS = 3
 
 @dataclass(frozen=True)
 class RestReport:
-    """`steps` taken, `moved` m by the fastest vertex in the last of them, `residual` as a share of the weight,
-    and whether the rule was met."""
+    """`steps` taken, `moved` m by the fastest vertex in the last of them, `residual` as a share of the
+    weight, and whether the rule was met."""
 
     steps: int
     moved: float

@@ -45,7 +45,7 @@ LEAD_IN_SECONDS = 1.0
 
 
 def simulate(scene: Scene, device: str = "cpu", progress: Progress | None = None) -> Sample:
-    """Simulate one scene; InputError for a scene that cannot be, SimulationError where the solver gives up."""
+    """Simulate one scene. InputError: the scene cannot be; SimulationError: the solver gave up."""
     return next(simulate_chain([scene], device, progress))
 
 
@@ -61,8 +61,9 @@ def simulate_chain(
         return
     first = scenes[0]
     for scene in scenes[1:]:
-        if (scene.garment, scene.fabric, scene.fabric_scale) != (first.garment, first.fabric, first.fabric_scale):
-            raise InputError(f"scene {scene.name}: a chain shares one garment and one fabric; start another chain")
+        same = scene.garment == first.garment and scene.fabric == first.fabric
+        if not same or scene.fabric_scale != first.fabric_scale:
+            raise InputError(f"scene {scene.name}: a chain shares garment and fabric; start another chain")
     mesh = cut_garment(first)
     scale = first.fabric_scale
     cloth = build_cloth(mesh, load_fabric(first.fabric).scaled(scale.density, scale.stretch, scale.bend))
@@ -113,7 +114,8 @@ class _Work:
     def __init__(self, scenes: Sequence[Scene], progress: Progress | None) -> None:
         self.total = DRESS_WORK
         for scene in scenes:
-            self.total += MORPH_WORK + (scene.solver.settle_steps if scene.motion is None else _frames_guess(scene))
+            self.total += MORPH_WORK
+            self.total += scene.solver.settle_steps if scene.motion is None else _frames_guess(scene)
         self.done = 0
         self.goal = 0
         self.progress = progress
@@ -160,7 +162,7 @@ def _beta(scene: Scene, model: BodyModel) -> NDArray[np.float64]:
     given = scene.body.beta
     if len(given) > model.num_betas:
         raise InputError(
-            f"body.beta holds {len(given)} values; body {model.name!r} has {model.num_betas}: give at most that many"
+            f"body.beta holds {len(given)} values; body {model.name!r} has {model.num_betas}: give no more"
         )
     return np.array([*given, *np.zeros(model.num_betas - len(given))])
 
@@ -207,7 +209,8 @@ def _sequence(
         try:
             worn.follow(theta, translation, 1.0 / step_rate)
             if passed == 0:
-                settle(worn.sim, scene.solver.settle_tolerance, scene.solver.settle_steps // 3, tick=work.tick)
+                steps = scene.solver.settle_steps // 3
+                settle(worn.sim, scene.solver.settle_tolerance, steps, tick=work.tick)
                 work.finish(MORPH_WORK)
         except SimulationError as error:
             where = "lead-in" if passed <= 0 else f"frame {passed // substeps}"
@@ -259,7 +262,8 @@ def _sample(
         seed=scene.seed,
         labels={"sequence": clip.name, "motion_source": clip.source} if clip is not None else {},
     )
-    return certify(sample, cloth, _certificate(scene, min(s[3] for s in states), rest, started, len(positions)))
+    distance = min(state[3] for state in states)
+    return certify(sample, cloth, _certificate(scene, distance, rest, started, len(positions)))
 
 
 def _drape_on_sphere(scene: Scene, mesh: GarmentMesh, cloth: ClothModel, device: str, work: _Work) -> Sample:

@@ -36,7 +36,8 @@ class GarmentTable(_Table):
 
 
 class BodyTable(_Table):
-    """Who wears it: `model` female, male, neutral or an SMPL file; `beta` standard deviations; `pose` of drapes."""
+    """Who wears it: `model` female, male, neutral or an SMPL file; `beta` in standard deviations; `pose` of
+    drapes."""
 
     model: str = "female"
     beta: list[Annotated[float, Field(ge=-5.0, le=5.0)]] = Field(default=[], max_length=300)
@@ -53,7 +54,8 @@ class ColliderTable(_Table):
 class MotionTable(_Table):
     """`clip` by name or AMASS file, from `start` to `end` seconds of it, stored at `fps` frames a second.
 
-    `spread_arms` turns arms that sink into this body's trunk or thighs outwards, as `muslin.sim.motion.arms` tells.
+    `spread_arms` turns arms that sink into this body's trunk or thighs outwards, as `muslin.sim.motion.arms`
+    tells.
     """
 
     clip: str
@@ -88,9 +90,10 @@ class SolverTable(_Table):
 class ExpectTable(_Table):
     """What must hold of the result; `muslin simulate` checks it. Intersections must always be zero.
 
-    At most: `largest_stretch`, the largest principal stretch in any frame, and `residual`, the force left on a drape as
-    a share of its weight. At least: `smallest_distance`, metres. From low to high: `lowest_point` and `highest_point`,
-    heights of the cloth in metres over all frames. Exactly: `frames`, and `at_rest`, whether a drape came to rest.
+    At most: `largest_stretch`, the largest principal stretch in any frame, and `residual`, the force left on
+    a drape as a share of its weight. At least: `smallest_distance`, metres. From low to high: `lowest_point`
+    and `highest_point`, heights of the cloth in metres over all frames. Exactly: `frames`, and `at_rest`,
+    whether a drape came to rest.
     """
 
     largest_stretch: Positive | None = None
@@ -131,7 +134,7 @@ class Scene(_Table):
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene file; `overrides` are `key=value` with dots for tables and TOML values (`body.beta=[2.0]`)."""
+    """Read a scene file; `overrides` are `key=value`, dots for tables, TOML values (`body.beta=[2.0]`)."""
     path = Path(path)
     if not path.is_file():
         raise InputError(f"scene {path}: no such file; give the path of a scene's TOML file")
@@ -153,7 +156,8 @@ def parse_scene(values: dict[str, Any], source: str = "scene") -> Scene:
         key = ".".join(str(part) for part in entry["loc"]) or "scene"
         if entry["type"] == "extra_forbidden":
             allowed = ", ".join(_allowed_keys(entry["loc"][:-1]))
-            raise InputError(f"{source}: unknown key {key}; allowed here are {allowed}; correct or remove it") from error
+            reason = f"unknown key {key}; allowed here are {allowed}; correct or remove it"
+            raise InputError(f"{source}: {reason}") from error
         value = entry.get("input")
         shown = f" = {json.dumps(value, default=str)}" if entry["loc"] else ""
         reason = entry["msg"].removeprefix("Value error, ")

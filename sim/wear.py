@@ -33,7 +33,7 @@ def a_pose() -> NDArray[np.float64]:
 
 
 class WornGarment:
-    """A garment worn by a body of shape `beta` in pose `theta` at `translation`; starts dressed in the T-pose."""
+    """A garment on a body of shape `beta`, pose `theta` and `translation`; starts dressed in the T-pose."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class WornGarment:
         grow_body(self.sim, model, beta, self.clearance.collider(body), tick)
 
     def body(self) -> NDArray[np.float64]:
-        """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces only."""
+        """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""
         return self.model.vertices(self.beta, self.theta, self.translation)
 
     def masked_faces(self) -> NDArray[np.int32]:
@@ -72,8 +72,8 @@ class WornGarment:
         self.translation = translation
         new = self.model.transforms(self.beta, self.theta, self.translation)[0]
         change = new @ np.linalg.inv(old)
-        moved = [x @ change[:3, :3].T + change[:3, 3] for x in (self.sim.positions, self.sim.collider_vertices)]
-        self.sim.place(*moved)
+        here = (self.sim.positions, self.sim.collider_vertices)
+        self.sim.place(*(x @ change[:3, :3].T + change[:3, 3] for x in here))
 
     def morph(self, beta: NDArray[np.float64], theta: NDArray[np.float64], tick: Tick = None) -> None:
         """Change shape and pose at rest, in steps in which no body vertex moves more than `MORPH_MOVE`."""

@@ -4,13 +4,13 @@ For a pair at distance d < dhat, s = d / dhat,
 
     E = kappa A m B(s),   B(s) = -(s - 1)^2 ln s,
 
-kappa in J/m^2, A the area of cloth in m^2 the pair stands for, m = 1 for vertex-triangle pairs. For edge-edge pairs
-m mollifies near-parallel edges, whose closest points jump: with c = |e1 x e2|^2 and
+kappa in J/m^2, A the area of cloth in m^2 the pair stands for, m = 1 for vertex-triangle pairs. For edge-edge
+pairs m mollifies near-parallel edges, whose closest points jump: with c = |e1 x e2|^2 and
 c0 = 1e-3 |e1|^2 |e2|^2 at rest, m = (2 - c / c0) c / c0 below c0.
 The Hessian keeps the positive semi-definite part m B'' grad d grad d^T.
 
-Sources: Li et al. 2020, "Incremental potential contact" (barrier, mollifier); Li et al. 2023, "Convergent IPC"
-(area weights).
+Sources: Li et al. 2020, "Incremental potential contact" (barrier, mollifier); Li et al. 2023, "Convergent
+IPC" (area weights).
 """
 
 import warp as wp
@@ -46,7 +46,9 @@ def barrier(s: wp.float64) -> wp.vec3d:
 
 
 @wp.func
-def mollifier(is_edge_edge: bool, rest: wp.float64, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d) -> wp.vec2d:
+def mollifier(
+    is_edge_edge: bool, rest: wp.float64, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d
+) -> wp.vec2d:
     """m and dm/dc, `rest` the product of the squared rest lengths."""
     one = wp.float64(1.0)
     if not is_edge_edge:
@@ -125,8 +127,8 @@ def barrier_derivatives(
 ):
     """Adds gradient and Hessian blocks of cloth vertices; counts active pairs.
 
-    `remaining` is the displacement that collider vertices still have to make: its linearised force is added to
-    the gradient, so that the Newton direction moves the cloth along with the collider.
+    `remaining` is the displacement that collider vertices still have to make: its linearised force is added
+    to the gradient, so that the Newton direction moves the cloth along with the collider.
     """
     k = wp.tid()
     pair = pairs[k]
@@ -191,8 +193,9 @@ def guard_pairs(
 ):
     """Adds a spring to the Newton system for every pair that the direction p would bring together.
 
-    To first order p changes the distance d of a pair by a = n . sum_i w_i p_i. Where d + a < 0.3 d, the spring
-    k (a + d / 2)^2 / 2 asks the next direction to leave it half its distance. Vertices of the collider keep their p.
+    To first order p changes the distance d of a pair by a = n . sum_i w_i p_i. Where d + a < 0.3 d, the
+    spring k (a + d / 2)^2 / 2 asks the next direction to leave it half its distance. Vertices of the collider
+    keep their p.
     """
     k = wp.tid()
     pair = pairs[k]
@@ -239,7 +242,7 @@ def active_pairs(
     out_force: wp.array(dtype=wp.float64),
     nearest: wp.array(dtype=wp.float64),
 ):
-    """Lists pairs within range with their weights, unit normals and normal forces, N; tracks the smallest distance."""
+    """Lists pairs within range: weights, unit normals, normal forces, N; tracks the smallest distance."""
     k = wp.tid()
     pair = pairs[k]
     x0 = x[pair[0]]

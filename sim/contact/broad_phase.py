@@ -1,7 +1,7 @@
 """Candidate pairs whose swept, inflated boxes overlap, as Warp kernels.
 
-Vertices of the cloth come first in the joint array X, collider vertices after them. Every pair has at least one
-cloth vertex; pairs that share a vertex are left out, as are collider primitives that are switched off.
+Vertices of the cloth come first in the joint array X, collider vertices after them. Every pair has at least
+one cloth vertex; pairs that share a vertex are left out, as are collider primitives that are switched off.
 Boxes are float32 and padded outwards by more than their rounding.
 """
 

@@ -1,8 +1,8 @@
 """Additive continuous collision detection, as a Warp kernel.
 
-Conservative advancement with distances only: while a pair is at distance d, no two of its points can meet before
-the time d / l, l the sum of the largest displacements of its two sides once the common motion is taken away. It
-stops when d has shrunk to the fraction `GAP` of its start, so a step never touches.
+Conservative advancement with distances only: while a pair is at distance d, no two of its points can meet
+before the time d / l, l the sum of the largest displacements of its two sides once the common motion is taken
+away. It stops when d has shrunk to the fraction `GAP` of its start, so a step never touches.
 
 Source: Li, Kaufman, Jiang 2021, "Codimensional incremental potential contact", algorithm 1.
 """

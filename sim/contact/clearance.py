@@ -1,14 +1,15 @@
 """Room for cloth where a body cuts into itself: armpits, elbows, crotch.
 
-Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the body
-there, and only there: a vertex whose surroundings along its outward normal are taken by another part of the body
-within `ROOM` is drawn inwards,
+Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the
+body there, and only there: a vertex whose surroundings along its outward normal are taken by another part of
+the body within `ROOM` is drawn inwards,
 
     s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
 
-g the gap and t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between them. The
-displacement is continuous in t: when limbs part, the collider turns back into the body and the cloth between them
-comes out on the right side. Faces of the body with a vertex so moved are the masked faces of the frame.
+g the gap and t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between
+them. The displacement is continuous in t: when limbs part, the collider turns back into the body and the
+cloth between them comes out on the right side. Faces of the body with a vertex so moved are the masked faces
+of the frame.
 """
 
 import igl
@@ -23,8 +24,8 @@ from muslin.sim.dataset.schema import MASK_GAP_M
 wp.set_module_options({"enable_backward": False})
 
 ROOM = 3.0e-3
-"""Metres of free distance that a vertex needs to stay where it is; less than what a masked face must show, since faces and
-vertices have different normals."""
+"""Metres of free distance that a vertex needs to stay where it is; less than what a masked face must show,
+since faces and vertices have different normals."""
 
 REACH = 0.08
 """Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
@@ -41,7 +42,7 @@ def free_distance(
     reach: float,
     out: wp.array(dtype=float),
 ):
-    """t of each vertex: free distance along its normal, minus the depth where it is inside; `reach` where free."""
+    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside."""
     i = wp.tid()
     n = normals[i]
     offset = float(1.0e-4)
@@ -103,9 +104,13 @@ class SelfClearance:
         """Indices of the faces on which `collider` differs from the body and that do lie within it."""
         moved = (vertices != collider).any(axis=1)
         faces = np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
-        return faces[masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)] if len(faces) else faces
+        return (
+            faces[masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)] if len(faces) else faces
+        )
 
-    def _free_distance(self, vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _free_distance(
+        self, vertices: NDArray[np.float64], normals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         self._points.assign(vertices.astype(np.float32))
         self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()

@@ -1,8 +1,8 @@
 """Closest points of point-triangle and edge-edge pairs, as Warp functions.
 
 A pair is four vertices X and four weights w with closest-point difference r = sum_i w_i X_i and distance
-d = |r|. The weights are stationary at the closest points, so w_i r / d is the exact gradient of d with respect to
-X_i wherever the closest points are unique.
+d = |r|. The weights are stationary at the closest points, so w_i r / d is the exact gradient of d with
+respect to X_i wherever the closest points are unique.
 
 Source: Ericson, "Real-Time Collision Detection", 2005, sections 5.1.5 and 5.1.9.
 """

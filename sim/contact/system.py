@@ -1,4 +1,4 @@
-"""Contact of one cloth with itself and with one moving collider: candidates, barrier, friction, safe steps."""
+"""Contact of one cloth with itself and one moving collider: candidates, barrier, friction, safe steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
-from muslin.sim.contact.barrier import PairMeasure, active_pairs, barrier_derivatives, barrier_value, guard_pairs
+from muslin.sim.contact.barrier import (
+    PairMeasure,
+    active_pairs,
+    barrier_derivatives,
+    barrier_value,
+    guard_pairs,
+)
 from muslin.sim.contact.broad_phase import (
     edge_edge_candidates,
     element_bounds,
@@ -24,8 +30,8 @@ from muslin.sim.solve.block_matrix import BlockMatrix
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """`range` m: distance below which the barrier acts; `margin` m that a search looks further; `stiffness` J/m^2; friction coefficients; `slip_speed`
-    m/s below which friction sticks smoothly."""
+    """`range` m: distance below which the barrier acts; `margin` m that a search looks further; `stiffness`
+    J/m^2; friction coefficients; `slip_speed` m/s below which friction sticks smoothly."""
 
     range: float = 2.0e-3
     margin: float = 2.0e-3
@@ -50,9 +56,8 @@ class _Elements:
     def update(self, vertex_low: wp.array, vertex_high: wp.array, rebuild: bool) -> None:
         if self.count == 0:
             return
-        wp.launch(
-            element_bounds, self.count, [self.indices, vertex_low, vertex_high, self.low, self.high], device=self.device
-        )
+        args = [self.indices, vertex_low, vertex_high, self.low, self.high]
+        wp.launch(element_bounds, self.count, args, device=self.device)
         if self.bvh is None or rebuild:
             self.bvh = wp.Bvh(self.low, self.high)
         else:
@@ -73,8 +78,8 @@ class _PairList:
 class ContactSystem:
     """Joint vertex array: V cloth vertices, then N collider vertices.
 
-    `collider_faces` (M, 3) index the collider's own vertices. Primitives of the collider that lie within it can
-    be switched off by `mask`.
+    `collider_faces` (M, 3) index the collider's own vertices. Primitives of the collider that lie within it
+    can be switched off by `mask`.
     """
 
     def __init__(
@@ -114,7 +119,10 @@ class ContactSystem:
         self.measure.range_ = settings.range
         self.measure.stiffness = settings.stiffness
 
-        self.lists = [_PairList(False, 8 * self.num_cloth, device), _PairList(True, 16 * self.num_cloth, device)]
+        self.lists = [
+            _PairList(False, 8 * self.num_cloth, device),
+            _PairList(True, 16 * self.num_cloth, device),
+        ]
         self.active = wp.zeros(1, dtype=wp.int32, device=device)
         self.nearest = wp.zeros(1, dtype=wp.float64, device=device)
         self._searches = 0
@@ -133,7 +141,11 @@ class ContactSystem:
         on[self.num_cloth :] = live
         self.vertex_on.assign(on)
         edges = self._body_edge_array - self.num_cloth
-        keys = igl.edges(self.collider_faces[face_on].astype(np.int64)) if face_on.any() else np.zeros((0, 2), int)
+        keys = (
+            igl.edges(self.collider_faces[face_on].astype(np.int64))
+            if face_on.any()
+            else np.zeros((0, 2), int)
+        )
         n = self.num_collider
         alive = np.isin(
             edges.min(1).astype(np.int64) * n + edges.max(1), keys.min(1).astype(np.int64) * n + keys.max(1)
@@ -143,8 +155,8 @@ class ContactSystem:
     def cover(self, x: wp.array, p: wp.array, reach: float) -> None:
         """Make sure that every pair that may come within range on the way from x to x + p is listed.
 
-        `reach` is the largest move |p_i|, metres. A search looks `margin` further than it must; while the moves since
-        then add up to no more than half of that, its list still holds.
+        `reach` is the largest move |p_i|, metres. A search looks `margin` further than it must; while the
+        moves since then add up to no more than half of that, its list still holds.
         """
         if 2.0 * (self._travelled + reach) <= self.settings.margin:
             self._travelled += reach
@@ -181,29 +193,21 @@ class ContactSystem:
             queries = self.cloth_edges
             for target in (self.cloth_edges, self.body_edges) if has_body else (self.cloth_edges,):
                 assert target.bvh is not None
-                wp.launch(
-                    edge_edge_candidates,
-                    queries.count,
-                    [target.bvh.id, queries.indices, target.indices, target.on, int(target is queries), *bounds]
-                    + [radius, out.count, out.pairs],
-                    device=self.device,
-                )
+                args = [target.bvh.id, queries.indices, target.indices, target.on, int(target is queries)]
+                args += [*bounds, radius, out.count, out.pairs]
+                wp.launch(edge_edge_candidates, queries.count, args, device=self.device)
             return
         searches = [(self.cloth_vertices, self.cloth_faces)]
         if has_body:
             searches += [(self.cloth_vertices, self.body_faces), (self.body_vertices, self.cloth_faces)]
         for vertices, target in searches:
             assert target.bvh is not None
-            wp.launch(
-                vertex_face_candidates,
-                len(vertices),
-                [target.bvh.id, vertices, target.indices, self.vertex_on, target.on, *bounds, low, high]
-                + [radius, out.count, out.pairs],
-                device=self.device,
-            )
+            args = [target.bvh.id, vertices, target.indices, self.vertex_on, target.on, *bounds, low, high]
+            args += [radius, out.count, out.pairs]
+            wp.launch(vertex_face_candidates, len(vertices), args, device=self.device)
 
     def largest_step(self, x: wp.array, p: wp.array, step: wp.array) -> float:
-        """Largest t in (0, 1] for which x + t p keeps every listed pair apart. `step` is a scratch array (1,)."""
+        """Largest t in (0, 1] at which x + t p keeps all listed pairs apart; `step` is scratch (1,)."""
         step.fill_(1.0)
         for pairs in self.lists:
             if pairs.length:
@@ -217,7 +221,8 @@ class ContactSystem:
                 args = [x, start, pairs.pairs, pairs.is_edge_edge, self.measure, energy]
                 wp.launch(barrier_value, pairs.length, args, device=self.device)
         if self.num_friction:
-            wp.launch(friction_value, self.num_friction, [x, start, self.friction, energy], device=self.device)
+            args = [x, start, self.friction, energy]
+            wp.launch(friction_value, self.num_friction, args, device=self.device)
 
     def add_derivatives(
         self, x: wp.array, start: wp.array, remaining: wp.array, gradient: wp.array, matrix: BlockMatrix
@@ -225,7 +230,8 @@ class ContactSystem:
         self.active.zero_()
         for pairs in self.lists:
             if pairs.length:
-                args = [x, start, remaining, pairs.pairs, pairs.is_edge_edge, self.measure, gradient, matrix, self.active]
+                args = [x, start, remaining, pairs.pairs, pairs.is_edge_edge, self.measure]
+                args += [gradient, matrix, self.active]
                 wp.launch(barrier_derivatives, pairs.length, args, device=self.device)
         if self.num_friction:
             args = [x, start, remaining, self.friction, gradient, matrix]
@@ -239,7 +245,7 @@ class ContactSystem:
                 wp.launch(guard_pairs, pairs.length, args, device=self.device)
 
     def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
-        """Freeze the contacts at x, which must be within reach of the last search, for this step's friction."""
+        """Freeze the contacts at x, which the last search must cover, for this step's friction."""
         self._list_active(x)
         if self.num_friction > len(self.friction.force):
             self._reserve_friction(2 * self.num_friction)
@@ -264,12 +270,16 @@ class ContactSystem:
         count = self.num_friction
         pairs = self.friction.pairs.numpy()[:count]
         points = x.numpy()[pairs]
-        distance = np.linalg.norm((self.friction.weights.numpy()[:count, :, None] * points).sum(axis=1), axis=1)
+        distance = np.linalg.norm(
+            (self.friction.weights.numpy()[:count, :, None] * points).sum(axis=1), axis=1
+        )
         k = int(np.argmin(distance))
         cloth = [int(v) for v in pairs[k] if v < self.num_cloth]
         collider = [int(v) - self.num_cloth for v in pairs[k] if v >= self.num_cloth]
         where = ", ".join(f"{value:.3f}" for value in points[k].mean(axis=0))
-        return f"{distance[k] * 1e3:.4f} mm between cloth {cloth} and collider {collider or 'none'} at ({where})"
+        return (
+            f"{distance[k] * 1e3:.4f} mm between cloth {cloth} and collider {collider or 'none'} at ({where})"
+        )
 
     def _list_active(self, x: wp.array) -> None:
         self._friction_count.zero_()

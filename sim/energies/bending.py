@@ -24,7 +24,7 @@ mat43d = wp.types.matrix(shape=(4, 3), dtype=wp.float64)
 
 @wp.struct
 class BendModel:
-    """Per-hinge rest data: see `muslin.sim.cloth.ClothModel`; `moment` (H, 5) holds J at the table's curvatures."""
+    """Rest data of hinges, see `muslin.sim.cloth.ClothModel`; `moment` (H, 5): J at the table's points."""
 
     hinges: wp.array(dtype=wp.vec4i)
     length: wp.array(dtype=wp.float64)
@@ -45,7 +45,7 @@ def hinge_angle(x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d) -> wp.fl
 
 @wp.func
 def hinge_angle_gradient(x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d) -> mat43d:
-    """Rows: gradients with respect to x0, x1, x2, x3, rad/m. A collapsed face counts as having height |e| / 1000."""
+    """Rows: gradients by x0, x1, x2, x3, rad/m. A collapsed face counts as having height |e| / 1000."""
     e = x1 - x0
     l2 = wp.max(wp.dot(e, e), wp.float64(1.0e-30))
     l = wp.sqrt(l2)
@@ -65,7 +65,9 @@ def hinge_angle_gradient(x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d)
 
 
 @wp.func
-def bend_response(alpha: wp.float64, h: int, stiffness: wp.array2d(dtype=wp.float64), moment: wp.array2d(dtype=wp.float64)) -> wp.vec3d:
+def bend_response(
+    alpha: wp.float64, h: int, stiffness: wp.array2d(dtype=wp.float64), moment: wp.array2d(dtype=wp.float64)
+) -> wp.vec3d:
     """J(alpha), k(alpha) alpha and its derivative with respect to alpha."""
     step = wp.float64(5.0)
     half = wp.float64(0.5)

@@ -21,7 +21,7 @@ be non-negative, and the geometric part of the positive principal stresses only.
 
 Damping adds (eta / (2 dt)) (G - G_prev) : C_rest : (G - G_prev) per area, eta in seconds.
 
-Sources: Wang, O'Brien, Ramamoorthi 2011 (table); Volino, Magnenat-Thalmann, Faure 2009 (Green-strain membranes).
+Sources: Wang, O'Brien, Ramamoorthi 2011 (table); Volino, Magnenat-Thalmann, Faure 2009 (Green strain).
 """
 
 import warp as wp
@@ -70,10 +70,18 @@ def q_form(c: wp.vec4d, g: strainv) -> wp.float64:
 
 
 @wp.func
+def stress_of(c: wp.vec4d, g: strainv) -> strainv:
+    """(s11, s22, s12) of the linear law, the gradient of q; s12 counts in both corners."""
+    two = wp.float64(2.0)
+    return strainv(two * (c[0] * g[0] + c[1] * g[1]), two * (c[1] * g[0] + c[2] * g[1]), c[3] * g[2])
+
+
+@wp.func
 def blend_weight(g: wp.float64) -> wp.float64:
     """t(g)."""
-    t = wp.float64(6.0) * (wp.sqrt(wp.float64(1.0) + wp.float64(2.0) * wp.max(g, wp.float64(0.0))) - wp.float64(1.0))
-    return wp.min(t, wp.float64(1.0))
+    one = wp.float64(1.0)
+    stretch = wp.sqrt(one + wp.float64(2.0) * wp.max(g, wp.float64(0.0)))
+    return wp.min(wp.float64(6.0) * (stretch - one), one)
 
 
 @wp.func
@@ -85,9 +93,14 @@ def blend_moment(g: wp.float64) -> wp.float64:
     s = wp.min(g, limit)
     value = wp.float64(0.0)
     if s < wp.float64(0.003):
-        value = wp.float64(6.0) * s * s * s * (
-            wp.float64(1.0 / 3.0) - s / wp.float64(8.0) + s * s / wp.float64(10.0) - s * s * s * wp.float64(5.0 / 48.0)
+        s3 = s * s * s
+        series = (
+            wp.float64(1.0 / 3.0)
+            - s / wp.float64(8.0)
+            + s * s / wp.float64(10.0)
+            - s3 * wp.float64(5.0 / 48.0)
         )
+        value = wp.float64(6.0) * s3 * series
     else:
         u = wp.float64(1.0) + wp.float64(2.0) * s
         r = wp.sqrt(u)
@@ -114,7 +127,9 @@ class Response:
 
 
 @wp.func
-def respond(g: strainv, m: int, rest: wp.array2d(dtype=wp.float64), strained: wp.array3d(dtype=wp.float64)) -> Response:
+def respond(
+    g: strainv, m: int, rest: wp.array2d(dtype=wp.float64), strained: wp.array3d(dtype=wp.float64)
+) -> Response:
     zero = wp.float64(0.0)
     half = wp.float64(0.5)
     one = wp.float64(1.0)
@@ -122,7 +137,7 @@ def respond(g: strainv, m: int, rest: wp.array2d(dtype=wp.float64), strained: wp
     c = wp.vec4d(rest[m, 0], rest[m, 1], rest[m, 2], rest[m, 3])
     out = Response()
     out.energy = q_form(c, g)
-    out.stress = strainv(two * (c[0] * g[0] + c[1] * g[1]), two * (c[1] * g[0] + c[2] * g[1]), c[3] * g[2])
+    out.stress = stress_of(c, g)
     out.tangent = c
 
     mean = half * (g[0] + g[1])
@@ -152,9 +167,10 @@ def respond(g: strainv, m: int, rest: wp.array2d(dtype=wp.float64), strained: wp
         dT = (t - two * T) / g1
         q = q_form(dc, g)
         out.energy += two * T * q
-        s11 = two * T * two * (dc[0] * g[0] + dc[1] * g[1])
-        s22 = two * T * two * (dc[1] * g[0] + dc[2] * g[1])
-        s12 = two * T * dc[3] * g[2]
+        s = stress_of(dc, g) * (two * T)
+        s11 = s[0]
+        s22 = s[1]
+        s12 = s[2]
         if r > wp.float64(1.0e-14):
             # Derivatives of (g1, theta, a) with respect to (G11, G22, G12); 2 S12 = dW/dG12.
             d1 = strainv(half + half * h / r, half - half * h / r, g[2] / r)
@@ -213,7 +229,7 @@ def stretch_value(
     damping: wp.float64,
     energy: wp.array(dtype=wp.float64),
 ):
-    """energy[0] += sum over faces of A W(G); `damping` is eta / dt, `previous` the strain it is relative to."""
+    """energy[0] += sum over faces of A W(G); `damping` is eta / dt, `previous` the strain it refers to."""
     f = wp.tid()
     face = model.faces[f]
     F = deformation_gradient(x[face[0]], x[face[1]], x[face[2]], model.inverse_rest[f])
@@ -249,7 +265,7 @@ def stretch_derivatives(
     if damping > wp.float64(0.0):
         rest = wp.vec4d(model.rest[m, 0], model.rest[m, 1], model.rest[m, 2], model.rest[m, 3])
         d = g - previous[f]
-        s += strainv(two * (rest[0] * d[0] + rest[1] * d[1]), two * (rest[1] * d[0] + rest[2] * d[1]), rest[3] * d[2]) * damping
+        s += stress_of(rest, d) * damping
         c += rest * damping
     area = model.rest_area[f]
     f1 = wp.vec3d(F[0, 0], F[1, 0], F[2, 0])
@@ -274,7 +290,8 @@ def stretch_derivatives(
             k22 = c22 * ni[1] * nj[1] + c33 * ni[0] * nj[0]
             block = wp.outer(f1, f1 * k11 + f2 * k12) + wp.outer(f2, f1 * k21 + f2 * k22)
             geometric = area * (
-                ni[0] * (positive[0] * nj[0] + positive[2] * nj[1]) + ni[1] * (positive[2] * nj[0] + positive[1] * nj[1])
+                ni[0] * (positive[0] * nj[0] + positive[2] * nj[1])
+                + ni[1] * (positive[2] * nj[0] + positive[1] * nj[1])
             )
             block[0, 0] = block[0, 0] + geometric
             block[1, 1] = block[1, 1] + geometric

@@ -11,9 +11,10 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class BlockMatrix:
-    """Rows `offsets` (V + 1,), `columns` (nnz,) ascending, `values` (nnz,); list `extra_*` of `extra_count[0]` blocks.
+    """Rows `offsets` (V + 1,), `columns` (nnz,) ascending, `values` (nnz,); the list `extra_*`.
 
-    `extra_count` runs on past the capacity of the list, so that the caller can see by how much it was too short.
+    `extra_count[0]` runs on past the capacity of the list, so that the caller sees by how much it was too
+    short.
     """
 
     offsets: wp.array(dtype=wp.int32)

@@ -1,7 +1,7 @@
 """Preconditioned conjugate gradients for A p = -g, whole in one serial kernel, for the CPU.
 
-The iteration stops when the quadratic model q(p) = p.A p / 2 + g.p no longer pays for itself: after at least
-8 iterations, when the last decrease times the number of iterations is below `tolerance` times the whole decrease.
+The iteration stops when the quadratic model q(p) = p.A p / 2 + g.p no longer falls enough: after at least 8
+iterations, when the last decrease times their number is below `tolerance` times the whole decrease.
 
 Source: Nash, Sofer 1990, "Assessing a search direction within a truncated-Newton method".
 """

@@ -1,8 +1,8 @@
 """Incomplete Cholesky factorisation IC(0) of the pattern of a block matrix, serial, as Warp functions.
 
-A + shift diag(A) = L L^T on the lower pattern of A. Diagonal blocks of L are kept inverted. Where a pivot is not
-positive the factorisation starts again with four times the shift; at `MAX_SHIFT` it is given up for the block
-diagonal.
+A + shift diag(A) = L L^T on the lower pattern of A. Diagonal blocks of L are kept inverted. Where a pivot is
+not positive the factorisation starts again with four times the shift; at `MAX_SHIFT` it is given up for the
+block diagonal.
 
 Source: Manteuffel 1980 (shifted incomplete factorisation).
 """
@@ -19,7 +19,8 @@ MAX_SHIFT = 1.0
 
 @wp.struct
 class LowerFactor:
-    """Strictly lower rows `offsets`, `columns`, their position `source` in the matrix, `values`; `inverse` (V,) of the diagonal."""
+    """Strictly lower rows `offsets`, `columns`, `values`, their positions `source` in the matrix; `inverse`
+    (V,) of the diagonal."""
 
     offsets: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)

@@ -62,7 +62,8 @@ class LinearSystem:
 
     def solve(self, gradient: wp.array, p: wp.array, tolerance: float, max_iterations: int) -> int:
         """Fill p's first V entries; returns the number of iterations."""
-        args = [self.matrix, self.factor, gradient, p, self.work, self.shift, tolerance, max_iterations, self.report]
+        args = [self.matrix, self.factor, gradient, p, self.work, self.shift, tolerance, max_iterations]
+        args.append(self.report)
         wp.launch(solve_serial, 1, args, device=self.device)
         iterations, used = self.report.numpy()[:2]
         # The next matrix is much like this one: start from half the shift that worked, not from the smallest.

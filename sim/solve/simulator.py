@@ -5,9 +5,9 @@ A step minimises the incremental potential
     E(x) = sum m |x - t|^2 (1 + a dt) / (2 dt^2) - m g.x + W_stretch + W_bend + B_contact + D_friction
 
 by projected Newton: positive semi-definite Hessian, preconditioned conjugate gradients, every move limited by
-continuous collision detection and backtracked until E falls. Collider vertices move along with the iterations:
-what they still have to travel enters the Newton direction, so that the cloth is carried, and the part that a safe
-step allows is made.
+continuous collision detection and backtracked until E falls. Collider vertices move along with the
+iterations: what they still have to travel enters the Newton direction, so that the cloth is carried, and the
+part that a safe step allows is made.
 
 Sources: Li et al. 2020 (incremental potential contact); Gast, Schroeder 2014 (optimisation integrators).
 """
@@ -30,10 +30,11 @@ from muslin.sim.solve.linear import LinearSystem
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m: largest
-    Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton once the
-    collider has arrived, `max_advances` before, with `relaxations` in between where the way was short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration; `linear_tolerance` of
-    `muslin.sim.solve.conjugate_gradients`."""
+    """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m:
+    largest Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton
+    once the collider has arrived, `max_advances` before, with `relaxations` in between where the way was
+    short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration;
+    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     damping: float = 2.0e-3
@@ -53,7 +54,7 @@ class SolverSettings:
 
 @dataclass
 class StepReport:
-    """Work of one time step: Newton and linear iterations, the last move (m), whether it met the tolerance."""
+    """Work of one time step: Newton and linear iterations, the last move (m), whether it met `tolerance`."""
 
     newton: int = 0
     linear: int = 0
@@ -123,10 +124,11 @@ class ClothSimulator:
         friction: bool = True,
         pin_targets: NDArray[np.float64] | None = None,
     ) -> StepReport:
-        """One time step of `dt` seconds while the collider moves to `collider_target` (N, 3) in a straight line.
+        """One time step of `dt` seconds while the collider moves straight to `collider_target` (N, 3).
 
-        Without `inertia` the velocity starts from rest: a proximal step towards equilibrium. A step in which the
-        collider cannot arrive is retried as two half steps, up to `max_splits` deep; then SimulationError.
+        Without `inertia` the velocity starts from rest: a proximal step towards equilibrium. A step in which
+        the collider cannot arrive is retried as two half steps, up to `max_splits` deep; then
+        SimulationError.
         """
         goal = self.collider_vertices if collider_target is None else collider_target
         saved_x, saved_v = self.x.numpy().copy(), self.velocity.copy()
@@ -141,8 +143,8 @@ class ClothSimulator:
     def force_residual(self, dt: float) -> float:
         """Norm of the net force left on the cloth at rest, as a share of its weight.
 
-        Elastic, contact and gravity forces, and friction as it stood at the start of the last step of `dt` seconds;
-        no inertia.
+        Elastic, contact and gravity forces, and friction as it stood at the start of the last step of `dt`
+        seconds; no inertia.
         """
         saved = self.weight.numpy().copy()
         self.weight.zero_()
@@ -161,7 +163,7 @@ class ClothSimulator:
         self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
 
     def restore(self, x: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
-        """Put the joint vertex array (V + N, 3) and the velocities back to a saved, intersection-free state."""
+        """Put the joint vertex array (V + N, 3) and the velocities back to a saved, free state."""
         self.x.assign(x)
         self.velocity = velocity.copy()
         self.p.zero_()
@@ -181,10 +183,12 @@ class ClothSimulator:
         if self._minimise(goal, dt, inertia, friction, pin_targets, report):
             return
         if splits == 0:
-            share = np.linalg.norm(goal - self.collider_vertices) / np.linalg.norm(goal - saved_x[self.cloth.num_vertices :])
+            way = np.linalg.norm(goal - saved_x[self.cloth.num_vertices :])
+            share = np.linalg.norm(goal - self.collider_vertices) / way
             raise SimulationError(
-                f"the collider cannot move on without touching the cloth: {share:.0%} of the way is left after "
-                f"{self.settings.max_splits} halvings of the step; closest are {self.contact.tightest(self.x)}; "
+                f"the collider cannot move on without touching the cloth: {share:.0%} of the way is left "
+                f"after {self.settings.max_splits} halvings of the step; "
+                f"closest are {self.contact.tightest(self.x)}; "
                 "use a smaller time step, a looser garment or a slower motion"
             )
         self.restore(saved_x, saved_v)
@@ -293,7 +297,8 @@ class ClothSimulator:
             wp.launch(quadratic_gradient, self.cloth.num_vertices, args, device=self.device)
             self.linear.add_diagonal(self.weight)
             self.elastic.add_derivatives(self.x, inverse_dt, self.gradient, self.linear.matrix)
-            self.contact.add_derivatives(self.x, self.start, self.remaining, self.gradient, self.linear.matrix)
+            matrix = self.linear.matrix
+            self.contact.add_derivatives(self.x, self.start, self.remaining, self.gradient, matrix)
             if self.linear.extras_fit():
                 return
 
