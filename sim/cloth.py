@@ -71,10 +71,10 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
     area = 0.5 * np.abs(np.linalg.det(rest))
     faces = mesh.faces.astype(np.int32)
     n = int(faces.max()) + 1
-    vertex_area = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=n)
+    vertex_area = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=n).astype(np.float64)
 
     edges, _, edge_of_corner = _edges(faces)
-    edge_area = np.bincount(edge_of_corner, np.tile(area / 3.0, 3), minlength=len(edges))
+    edge_area = np.bincount(edge_of_corner, np.tile(area / 3.0, 3), len(edges)).astype(np.float64)
     hinges, hinge_faces, hinge_corner = _hinges(faces, edges, edge_of_corner)
     stiffness = np.zeros((len(hinges), 5))
     length = np.zeros(len(hinges))
