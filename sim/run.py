@@ -24,6 +24,7 @@ from muslin.sim.cloth import ClothModel, build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.sample import BodyTrack, Sample
+from muslin.sim.device import open_device
 from muslin.sim.material import load_fabric
 from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import load_motion
@@ -56,9 +57,9 @@ def simulate_chain(
 
     The garment is put on once; between drapes the body changes shape inside it.
     """
-    wp.config.quiet = True
     if not scenes:
         return
+    open_device(device)
     first = scenes[0]
     for scene in scenes[1:]:
         same = scene.garment == first.garment and scene.fabric == first.fabric
@@ -99,12 +100,7 @@ def cut_garment(scene: Scene) -> GarmentMesh:
 
 def compile_kernels(device: str = "cpu") -> None:
     """Compile every kernel of the simulator for `device`, or load it from Warp's cache."""
-    wp.config.quiet = True
-    try:
-        wp.get_device(device)
-    except Exception as error:
-        names = ", ".join(str(d) for d in wp.get_devices())
-        raise InputError(f"device {device!r}: not available here; choose one of {names}") from error
+    open_device(device)
     wp.force_load(device)
 
 
