@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
+from muslin.sim.overrides import set_value
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -143,7 +144,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"scene {path}: not valid TOML ({error}); correct the file") from error
     for override in overrides:
-        set_value(values, override)
+        set_value(values, override, "solver.dt=0.01")
     return parse_scene(values, str(path))
 
 
@@ -162,23 +163,6 @@ def parse_scene(values: dict[str, Any], source: str = "scene") -> Scene:
         shown = f" = {json.dumps(value, default=str)}" if entry["loc"] else ""
         reason = entry["msg"].removeprefix("Value error, ")
         raise InputError(f"{source}: {key}{shown}: {reason}; correct it") from error
-
-
-def set_value(values: dict[str, Any], override: str) -> None:
-    """Apply one `key=value` override to raw TOML values."""
-    key, separator, text = override.partition("=")
-    if not separator or not key.strip():
-        raise InputError(f"--set {override!r}: must be key=value, for example solver.dt=0.01")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text  # a bare word is a string
-    *tables, last = key.strip().split(".")
-    for table in tables:
-        values = values.setdefault(table, {})
-        if not isinstance(values, dict):
-            raise InputError(f"--set {override!r}: {table} is a value, not a table")
-    values[last] = value
 
 
 def _allowed_keys(location: tuple[int | str, ...]) -> list[str]:

@@ -12,6 +12,10 @@ INSIDE = 0.5
 # The fast winding number is an expansion: values this close to the threshold are computed exactly instead.
 UNSURE = 0.1
 
+MASK_GAP_M = 4e-3
+"""Metres. A face may be left out of contact where it lies inside the body or within this distance of another
+part of it, since two layers of cloth with contact gaps do not fit there."""
+
 
 def interior_points(vertices: ArrayLike, faces: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
     """Whether each point lies inside a closed surface, which may intersect itself.

@@ -18,8 +18,7 @@ import scipy.sparse
 import warp as wp
 from numpy.typing import NDArray
 
-from muslin.sim.body.interior import masked_face_is_interior
-from muslin.sim.dataset.schema import MASK_GAP_M
+from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 
 wp.set_module_options({"enable_backward": False})
 

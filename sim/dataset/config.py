@@ -42,6 +42,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
+from muslin.sim.overrides import set_value
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=60)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -170,7 +171,7 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> DatasetConfi
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file}: not TOML: {error}") from error
     for override in overrides:
-        _set(values, override)
+        set_value(values, override, "scene.fabric=gray-interlock")
     return parse_config(values, str(file))
 
 
@@ -208,34 +209,3 @@ def _keys_beside(location: tuple[Any, ...]) -> list[str]:
         elif part in _TABLES:
             model = _TABLES[part]
     return list(model.model_fields)
-
-
-def _set(values: dict[str, Any], override: str) -> None:
-    key, equals, text = override.partition("=")
-    if not equals or not key.strip():
-        raise InputError(f"--set {override!r}: must be key=value, for example scene.fabric=denim")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    table: Any = values
-    *path, last = key.strip().split(".")
-    for part in path:
-        table = _step(table, part, override)
-    if isinstance(table, list):
-        table[_place(table, last, override)] = value
-    else:
-        table[last] = value
-
-
-def _step(table: Any, part: str, override: str) -> Any:
-    entry = table[_place(table, part, override)] if isinstance(table, list) else table.setdefault(part, {})
-    if not isinstance(entry, dict | list):
-        raise InputError(f"--set {override!r}: {part} is a value, not a table; give the key of a value")
-    return entry
-
-
-def _place(table: list[Any], part: str, override: str) -> int:
-    if not part.isdigit() or int(part) >= len(table):
-        raise InputError(f"--set {override!r}: {part} must be a place from 0 to {len(table) - 1} in the list")
-    return int(part)

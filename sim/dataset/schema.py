@@ -25,10 +25,6 @@ PARTIAL = ".partial"
 LOCK = ".lock"
 SUFFIX = ".zarr"
 
-MASK_GAP_M = 4e-3
-"""A face of the body may be left out of contact only if it lies inside the body or within this distance of
-another part of its surface, metres."""
-
 CHUNK_BYTES = 1 << 20
 """Frames are gathered in chunks of about this size, so that one frame can be read without the whole
 sequence."""

@@ -16,7 +16,7 @@ import ipctk
 import numpy as np
 
 from muslin.garments.errors import InputError
-from muslin.sim.body.interior import masked_face_is_interior
+from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.header import read_header
 from muslin.sim.dataset.index import in_plan_order, listed_ids
@@ -28,7 +28,6 @@ from muslin.sim.dataset.processes import (
     worker_died,
 )
 from muslin.sim.dataset.sample import Sample
-from muslin.sim.dataset.schema import MASK_GAP_M
 
 FRAMES_A_TASK = 24
 
