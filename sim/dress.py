@@ -127,11 +127,7 @@ def _shoulder_tip(front: NDArray[np.float64]) -> float:
 
 def _around_torso(flat: NDArray[np.float64], side: float) -> NDArray[np.float64]:
     x, y = flat.T
-    order = np.argsort(y)
-    # Half width of the panel at each height: the widest vertex near it.
-    bins = np.linspace(y.min(), y.max(), 25)
-    width = np.array([np.abs(x[np.abs(y - b) <= (bins[1] - bins[0])]).max() for b in bins])
-    half = np.interp(y[order], bins, width)[np.argsort(order)]
+    half = np.interp(y, *_half_widths(flat, 25))
     # An ellipse whose half perimeter, pi (a + b) / 2, is the width of the panel.
     a = 4.0 * half / (np.pi * (1.0 + TORSO_DEPTH_TO_WIDTH))
     angle = 0.5 * np.pi * np.clip(x / half, -1.0, 1.0)
@@ -147,8 +143,7 @@ def _around_arm(
     flat: NDArray[np.float64], shoulder: NDArray[np.float64], tip: float, side: float
 ) -> NDArray[np.float64]:
     x, y = flat.T
-    bins = np.linspace(y.min(), y.max(), 15)
-    width = np.array([np.abs(x[np.abs(y - b) <= (bins[1] - bins[0])]).max() for b in bins])
+    bins, width = _half_widths(flat, 15)
     bicep = int(np.argmax(width))
     width[bicep:] = width[bicep]  # the cap opens up instead of closing round the arm
     half = np.interp(y, bins, width)
@@ -158,3 +153,15 @@ def _around_arm(
         [side * (tip - y), shoulder[1] + radius * np.cos(angle), shoulder[2] - side * radius * np.sin(angle)],
         axis=1,
     )
+
+
+def _half_widths(flat: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Up to `count` rising heights and the half widths of a panel there: those of its widest vertices near.
+
+    A short panel of large triangles has heights that no vertex is near; they are left out.
+    """
+    x, y = flat.T
+    bins = np.linspace(y.min(), y.max(), count)
+    near = np.abs(y - bins[:, None]) <= bins[1] - bins[0]
+    held = near.any(axis=1)
+    return bins[held], np.where(near, np.abs(x), 0.0).max(axis=1)[held]
