@@ -9,8 +9,8 @@ from muslin.sim.scene import ExpectTable, Scene
 def check_expectations(scene: Scene, sample: Sample) -> list[str]:
     """One sentence for every entry of `scene.expect` that `sample` violates: key, measured, allowed.
 
-    Intersections must be zero whatever the scene says. A figure that the certificate does not hold violates the
-    entry that asks for it, except the smallest distance: without one, nothing came near anything.
+    Intersections must be zero whatever the scene says. A figure that the certificate does not hold violates
+    the entry that asks for it, except the smallest distance: without one, nothing came near anything.
     """
     found = sample.certificate
     wanted = scene.expect
@@ -27,7 +27,9 @@ def check_expectations(scene: Scene, sample: Sample) -> list[str]:
     violations += _at_most("residual", found.force_residual, wanted.residual)
     distance, least = found.min_distance_m, wanted.smallest_distance
     if least is not None and distance is not None and not distance >= least:
-        violations.append(f"expect.smallest_distance: measured {distance:.4g} m, allowed is at least {least:.4g} m")
+        violations.append(
+            f"expect.smallest_distance: measured {distance:.4g} m, allowed is at least {least:.4g} m"
+        )
     violations += _points(wanted, sample)
     if wanted.frames is not None and sample.num_frames != wanted.frames:
         violations.append(f"expect.frames: measured {sample.num_frames}, allowed is {wanted.frames}")
@@ -53,7 +55,6 @@ def _points(wanted: ExpectTable, sample: Sample) -> list[str]:
         ("highest_point", float(heights.max()), wanted.highest_point),
     ):
         if allowed is not None and not allowed[0] <= measured <= allowed[1]:
-            violations.append(
-                f"expect.{key}: measured {measured:.4g} m, allowed is from {allowed[0]:.4g} to {allowed[1]:.4g} m"
-            )
+            span = f"from {allowed[0]:.4g} to {allowed[1]:.4g} m"
+            violations.append(f"expect.{key}: measured {measured:.4g} m, allowed is {span}")
     return violations
