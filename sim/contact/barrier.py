@@ -16,7 +16,7 @@ IPC" (area weights).
 import warp as wp
 
 from muslin.sim.contact.distance import pair_difference, pair_weights
-from muslin.sim.solve.block_matrix import BlockMatrix, add_block
+from muslin.sim.solve.block_matrix import BlockMatrix, add_pair
 
 wp.set_module_options({"enable_backward": False})
 
@@ -46,15 +46,28 @@ def barrier(s: wp.float64) -> wp.vec3d:
 
 
 @wp.func
+def closest(is_edge_edge: bool, pair: wp.vec4i, x: wp.array(dtype=wp.vec3d)) -> wp.vec4d:
+    """Weights of the closest points of a pair."""
+    return pair_weights(is_edge_edge, x[pair[0]], x[pair[1]], x[pair[2]], x[pair[3]])
+
+
+@wp.func
+def difference(w: wp.vec4d, pair: wp.vec4i, x: wp.array(dtype=wp.vec3d)) -> wp.vec3d:
+    """Vector between the closest points of a pair with weights w."""
+    return pair_difference(w, x[pair[0]], x[pair[1]], x[pair[2]], x[pair[3]])
+
+
+@wp.func
 def mollifier(
-    is_edge_edge: bool, rest: wp.float64, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d
+    is_edge_edge: bool, pair: wp.vec4i, x: wp.array(dtype=wp.vec3d), rest: wp.array(dtype=wp.vec3d)
 ) -> wp.vec2d:
-    """m and dm/dc, `rest` the product of the squared rest lengths."""
+    """m and dm/dc; `rest` is the configuration whose edge lengths enter c0."""
     one = wp.float64(1.0)
     if not is_edge_edge:
         return wp.vec2d(one, wp.float64(0.0))
-    n = wp.cross(x1 - x0, x3 - x2)
-    c0 = wp.float64(1.0e-3) * rest
+    n = wp.cross(x[pair[1]] - x[pair[0]], x[pair[3]] - x[pair[2]])
+    lengths = wp.length_sq(rest[pair[1]] - rest[pair[0]]) * wp.length_sq(rest[pair[3]] - rest[pair[2]])
+    c0 = wp.float64(1.0e-3) * lengths
     y = wp.dot(n, n) / c0
     if y >= one:
         return wp.vec2d(one, wp.float64(0.0))
@@ -80,14 +93,6 @@ def pair_area(is_edge_edge: bool, pair: wp.vec4i, measure: PairMeasure) -> wp.fl
     return wp.float64(0.5) * area[pair[0]]
 
 
-@wp.func
-def rest_product(is_edge_edge: bool, pair: wp.vec4i, rest: wp.array(dtype=wp.vec3d)) -> wp.float64:
-    """Product of squared edge lengths in a reference configuration."""
-    if not is_edge_edge:
-        return wp.float64(1.0)
-    return wp.length_sq(rest[pair[1]] - rest[pair[0]]) * wp.length_sq(rest[pair[3]] - rest[pair[2]])
-
-
 @wp.kernel
 def barrier_value(
     x: wp.array(dtype=wp.vec3d),
@@ -100,15 +105,10 @@ def barrier_value(
     """energy[0] += sum of barrier energies. `reference` (start of the step) gives the lengths in c0."""
     k = wp.tid()
     pair = pairs[k]
-    x0 = x[pair[0]]
-    x1 = x[pair[1]]
-    x2 = x[pair[2]]
-    x3 = x[pair[3]]
-    w = pair_weights(is_edge_edge, x0, x1, x2, x3)
-    d = wp.length(pair_difference(w, x0, x1, x2, x3))
+    d = wp.length(difference(closest(is_edge_edge, pair, x), pair, x))
     s = d / measure.range_
     if s < wp.float64(1.0):
-        m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)[0]
+        m = mollifier(is_edge_edge, pair, x, reference)[0]
         scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
         wp.atomic_add(energy, 0, scale * m * barrier(s)[0])
 
@@ -132,18 +132,14 @@ def barrier_derivatives(
     """
     k = wp.tid()
     pair = pairs[k]
-    x0 = x[pair[0]]
-    x1 = x[pair[1]]
-    x2 = x[pair[2]]
-    x3 = x[pair[3]]
-    w = pair_weights(is_edge_edge, x0, x1, x2, x3)
-    r = pair_difference(w, x0, x1, x2, x3)
+    w = closest(is_edge_edge, pair, x)
+    r = difference(w, pair, x)
     d = wp.length(r)
     s = d / measure.range_
     if s >= wp.float64(1.0):
         return
     wp.atomic_add(active, 0, 1)
-    m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)
+    m = mollifier(is_edge_edge, pair, x, reference)
     scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
     b = barrier(s)
     n = r / d
@@ -154,31 +150,20 @@ def barrier_derivatives(
         if pair[i] >= measure.num_cloth:
             carried += w[i] * wp.dot(n, remaining[pair[i]])
     along = n * (force + curvature * carried)
-    turn0 = wp.vec3d()
-    turn1 = wp.vec3d()
+    add_pair(gradient, matrix, pair, w, measure.num_cloth, along, wp.outer(n * curvature, n))
     if m[1] != wp.float64(0.0):
         # gradient of c = |e1 x e2|^2
-        e1 = x1 - x0
-        e2 = x3 - x2
+        e1 = x[pair[1]] - x[pair[0]]
+        e2 = x[pair[3]] - x[pair[2]]
         k2 = wp.float64(2.0) * scale * b[0] * m[1]
-        turn0 = (e1 * wp.dot(e2, e2) - e2 * wp.dot(e1, e2)) * k2
-        turn1 = (e2 * wp.dot(e1, e1) - e1 * wp.dot(e1, e2)) * k2
-    block = wp.outer(n * curvature, n)
-    for i in range(int(0), int(4)):
-        if pair[i] < measure.num_cloth:
-            g = along * w[i]
-            if i == 0:
-                g -= turn0
-            if i == 1:
-                g += turn0
-            if i == 2:
-                g -= turn1
-            if i == 3:
-                g += turn1
-            wp.atomic_add(gradient, pair[i], g)
-            for j in range(int(0), int(4)):
-                if pair[j] < measure.num_cloth:
-                    add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))
+        turn1 = (e1 * wp.dot(e2, e2) - e2 * wp.dot(e1, e2)) * k2
+        turn2 = (e2 * wp.dot(e1, e1) - e1 * wp.dot(e1, e2)) * k2
+        for i in range(int(0), int(2)):
+            sign = wp.float64(2 * i - 1)
+            if pair[i] < measure.num_cloth:
+                wp.atomic_add(gradient, pair[i], turn1 * sign)
+            if pair[2 + i] < measure.num_cloth:
+                wp.atomic_add(gradient, pair[2 + i], turn2 * sign)
 
 
 @wp.kernel
@@ -199,12 +184,8 @@ def guard_pairs(
     """
     k = wp.tid()
     pair = pairs[k]
-    x0 = x[pair[0]]
-    x1 = x[pair[1]]
-    x2 = x[pair[2]]
-    x3 = x[pair[3]]
-    w = pair_weights(is_edge_edge, x0, x1, x2, x3)
-    r = pair_difference(w, x0, x1, x2, x3)
+    w = closest(is_edge_edge, pair, x)
+    r = difference(w, pair, x)
     d = wp.length(r)
     n = r / d
     approach = wp.float64(0.0)
@@ -219,13 +200,7 @@ def guard_pairs(
     area = pair_area(is_edge_edge, pair, measure)
     spring = wp.float64(10.0) * measure.stiffness * area / (measure.range_ * measure.range_)
     along = n * (spring * (carried + wp.float64(0.5) * d))
-    block = wp.outer(n * spring, n)
-    for i in range(int(0), int(4)):
-        if pair[i] < measure.num_cloth:
-            wp.atomic_add(gradient, pair[i], along * w[i])
-            for j in range(int(0), int(4)):
-                if pair[j] < measure.num_cloth:
-                    add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))
+    add_pair(gradient, matrix, pair, w, measure.num_cloth, along, wp.outer(n * spring, n))
 
 
 @wp.kernel
@@ -245,12 +220,8 @@ def active_pairs(
     """Lists pairs within range: weights, unit normals, normal forces, N; tracks the smallest distance."""
     k = wp.tid()
     pair = pairs[k]
-    x0 = x[pair[0]]
-    x1 = x[pair[1]]
-    x2 = x[pair[2]]
-    x3 = x[pair[3]]
-    w = pair_weights(is_edge_edge, x0, x1, x2, x3)
-    r = pair_difference(w, x0, x1, x2, x3)
+    w = closest(is_edge_edge, pair, x)
+    r = difference(w, pair, x)
     d = wp.length(r)
     wp.atomic_min(nearest, 0, d)
     s = d / measure.range_
@@ -258,7 +229,7 @@ def active_pairs(
         return
     slot = wp.atomic_add(count, 0, 1)
     if slot < out_pairs.shape[0]:
-        m = mollifier(is_edge_edge, rest_product(is_edge_edge, pair, reference), x0, x1, x2, x3)[0]
+        m = mollifier(is_edge_edge, pair, x, reference)[0]
         scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
         out_pairs[slot] = pair
         out_weights[slot] = w

@@ -11,7 +11,7 @@ Source: Li et al. 2020, "Incremental potential contact", section 5.
 
 import warp as wp
 
-from muslin.sim.solve.block_matrix import BlockMatrix, add_block
+from muslin.sim.solve.block_matrix import BlockMatrix, add_pair
 
 wp.set_module_options({"enable_backward": False})
 
@@ -95,9 +95,4 @@ def friction_derivatives(
             carried += remaining[pair[i]] * w[i]
     along = (u + carried - n * wp.dot(n, carried)) * c
     block = (wp.identity(n=3, dtype=wp.float64) - wp.outer(n, n)) * c
-    for i in range(int(0), int(4)):
-        if pair[i] < model.num_cloth:
-            wp.atomic_add(gradient, pair[i], along * w[i])
-            for j in range(int(0), int(4)):
-                if pair[j] < model.num_cloth:
-                    add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))
+    add_pair(gradient, matrix, pair, w, model.num_cloth, along, block)

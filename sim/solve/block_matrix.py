@@ -58,6 +58,26 @@ def add_block(matrix: BlockMatrix, i: int, j: int, block: wp.mat33d):
                 matrix.extra_values[k] = block
 
 
+@wp.func
+def add_pair(
+    gradient: wp.array(dtype=wp.vec3d),
+    matrix: BlockMatrix,
+    pair: wp.vec4i,
+    w: wp.vec4d,
+    count: int,
+    force: wp.vec3d,
+    block: wp.mat33d,
+):
+    """Adds w_i `force` to the gradient and w_i w_j `block` to the matrix for vertices i, j below `count`."""
+    # int(0) keeps the loops dynamic: unrolled, the kernels compile several times longer.
+    for i in range(int(0), int(4)):
+        if pair[i] < count:
+            wp.atomic_add(gradient, pair[i], force * w[i])
+            for j in range(int(0), int(4)):
+                if pair[j] < count:
+                    add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))
+
+
 @wp.kernel
 def add_diagonal(matrix: BlockMatrix, weight: wp.array(dtype=wp.float64)):
     """Adds weight[i] I to block (i, i)."""
