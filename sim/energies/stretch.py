@@ -14,7 +14,9 @@ so is not the gradient of any energy. The energy here is its work along the stra
 
 so that pulling along any fixed direction of strain reproduces the table, and the force is W's exact gradient.
 Where both principal strains are alike, theta has no meaning: dc turns to its mean over theta with
-a = min(1, (g1 - g2) / g1), which is 1 in every uniaxial test.
+a = S(min(1, (g1 - g2) / g1)), which is 1 in every uniaxial test. Between the measured angles the table is
+interpolated with S(u) = u^2 (3 - 2 u): straight lines would put kinks into W at every measured angle, where cloth
+comes to rest with forces that no solver can balance.
 
 The Hessian is positive semi-definite by construction: tangent coefficients c_rest + (t + g t') dc clamped to
 be non-negative, and the geometric part of the positive principal stresses only.
@@ -24,9 +26,17 @@ Damping adds (eta / (2 dt)) (G - G_prev) : C_rest : (G - G_prev) per area, eta i
 Sources: Wang, O'Brien, Ramamoorthi 2011 (table); Volino, Magnenat-Thalmann, Faure 2009 (Green strain).
 """
 
+import math
+
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
+
+# Named, because arithmetic between literals within a kernel is done in single precision.
+FULL_BLEND = wp.constant(wp.float64(13.0 / 72.0))
+"""Green strain at which t reaches 1: a principal stretch of 7/6."""
+ROW_ANGLE = wp.constant(wp.float64(math.pi / 8.0))
+"""Angle between two rows of the table."""
 
 mat32d = wp.types.matrix(shape=(3, 2), dtype=wp.float64)
 strainv = wp.types.vector(length=3, dtype=wp.float64)
@@ -77,39 +87,27 @@ def stress_of(c: wp.vec4d, g: strainv) -> strainv:
 
 
 @wp.func
+def elongation(g: wp.float64) -> wp.float64:
+    """sqrt(1 + 2 g) - 1, principal stretch less 1, without cancellation; 0 in compression."""
+    one = wp.float64(1.0)
+    two_g = wp.float64(2.0) * wp.max(g, wp.float64(0.0))
+    return two_g / (wp.sqrt(one + two_g) + one)
+
+
+@wp.func
 def blend_weight(g: wp.float64) -> wp.float64:
     """t(g)."""
-    one = wp.float64(1.0)
-    stretch = wp.sqrt(one + wp.float64(2.0) * wp.max(g, wp.float64(0.0)))
-    return wp.min(wp.float64(6.0) * (stretch - one), one)
+    return wp.min(wp.float64(6.0) * elongation(g), wp.float64(1.0))
 
 
 @wp.func
 def blend_moment(g: wp.float64) -> wp.float64:
-    """I(g) = int_0^g s t(s) ds; a series below 0.003, where the closed form cancels."""
-    limit = wp.float64(13.0 / 72.0)
-    if g <= wp.float64(0.0):
-        return wp.float64(0.0)
-    s = wp.min(g, limit)
-    value = wp.float64(0.0)
-    if s < wp.float64(0.003):
-        s3 = s * s * s
-        series = (
-            wp.float64(1.0 / 3.0)
-            - s / wp.float64(8.0)
-            + s * s / wp.float64(10.0)
-            - s3 * wp.float64(5.0 / 48.0)
-        )
-        value = wp.float64(6.0) * s3 * series
-    else:
-        u = wp.float64(1.0) + wp.float64(2.0) * s
-        r = wp.sqrt(u)
-        value = wp.float64(6.0) * (
-            wp.float64(0.25) * (wp.float64(0.4) * u * u * r - wp.float64(2.0 / 3.0) * u * r)
-            + wp.float64(1.0 / 15.0)
-            - wp.float64(0.5) * s * s
-        )
-    return value + wp.float64(0.5) * (g * g - s * s)
+    """I(g) = int_0^g s t(s) ds = d^3 (2 + 9/4 d + 3/5 d^2) up to full blend, d the elongation."""
+    s = wp.clamp(g, wp.float64(0.0), FULL_BLEND)
+    d = elongation(s)
+    moment = d * d * d * (wp.float64(2.0) + d * (wp.float64(2.25) + d * wp.float64(0.6)))
+    beyond = wp.max(g, s)
+    return moment + wp.float64(0.5) * (beyond * beyond - s * s)
 
 
 @wp.func
@@ -146,9 +144,11 @@ def respond(
     g1 = mean + r
     if g1 > wp.float64(1.0e-12):
         angle = half * wp.atan2(g[2], h)
-        position = wp.abs(angle) / wp.float64(wp.pi / 8.0)
+        position = wp.abs(angle) / ROW_ANGLE
         row = wp.min(int(position), 3)
-        w = position - wp.float64(row)
+        u = position - wp.float64(row)
+        w = u * u * (wp.float64(3.0) - two * u)
+        dw = wp.float64(6.0) * u * (one - u)
         low = strained_at(strained, m, row)
         high = strained_at(strained, m, row + 1)
         average = (
@@ -158,7 +158,8 @@ def respond(
             + strained_at(strained, m, 3)
             + strained_at(strained, m, 4) * half
         ) * wp.float64(0.25)
-        a = wp.min(one, two * r / g1)
+        ratio = wp.min(one, two * r / g1)
+        a = ratio * ratio * (wp.float64(3.0) - two * ratio)
         directional = low * (one - w) + high * w - average
         dc = average + directional * a - c
 
@@ -178,14 +179,14 @@ def respond(
             sign = one
             if angle < zero:
                 sign = -one
-            turn = sign * two * T * a * q_form((high - low) / wp.float64(wp.pi / 8.0), g)
+            turn = sign * two * T * a * q_form((high - low) * (dw / ROW_ANGLE), g)
             dtheta = strainv(-g[2], g[2], two * h) * (wp.float64(0.25) / (r * r))
             blend = zero
             dr = strainv(half * h / r, -half * h / r, g[2] / r)
             da = strainv(zero, zero, zero)
-            if a < one:
+            if ratio < one:
                 blend = two * T * q_form(directional, g)
-                da = (dr - d1 * (r / g1)) * (two / g1)
+                da = (dr - d1 * (r / g1)) * (wp.float64(6.0) * ratio * (one - ratio) * two / g1)
             total = d1 * along + dtheta * turn + da * blend
             s11 += total[0]
             s22 += total[1]
