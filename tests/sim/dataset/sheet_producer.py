@@ -109,12 +109,18 @@ def make_scene(values: dict[str, Any]) -> dict[str, Any]:
 def simulate(
     scenes: list[dict[str, Any]], device: str, progress: Callable[[int, int], None] | None
 ) -> Iterator[Sample]:
-    """Samples of a chain of scenes; SHEET_DELAY s each; fails at shape `fail_at`, `die` ends the process."""
+    """Samples of a chain of scenes; fails at shape `fail_at`, `die` ends the process.
+
+    SHEET_DELAY s each; shapes whose beta is above SHEET_HOLD are never done.
+    """
     phase = 0.0
+    hold = float(os.environ.get("SHEET_HOLD", "inf"))
     for done, scene in enumerate(scenes):
         beta = scene.get("body", {}).get("beta", [0.0])
         phase += beta[0]
         time.sleep(float(os.environ.get("SHEET_DELAY", "0")))
+        while beta[0] > hold:
+            time.sleep(1.0)
         if scene.get("fail_at") == beta[0]:
             raise InputError(f"cannot dress shape {beta[0]}")
         if scene.get("die"):
