@@ -24,7 +24,7 @@ def resolution_of(resolution: int | str) -> int:
         key = int(key)
     if key not in EDGE_LENGTHS:
         raise InputError(
-            f"resolution = {resolution} is not known; allowed: {', '.join(map(str, EDGE_LENGTHS))} "
+            f"template resolution = {resolution} is not known; allowed: {', '.join(map(str, EDGE_LENGTHS))} "
             f"(vertices) or {', '.join(NAMES)}"
         )
     return int(key)

@@ -24,7 +24,7 @@ mat43d = wp.types.matrix(shape=(4, 3), dtype=wp.float64)
 
 @wp.struct
 class BendModel:
-    """Rest data of hinges, see `muslin.sim.cloth.ClothModel`; `moment` (H, 5): J at the table's points."""
+    """Rest data of hinges, see `muslin.sim.cloth.ClothModel`; `moment` (H, 5): J at its curvatures."""
 
     hinges: wp.array(dtype=wp.vec4i)
     length: wp.array(dtype=wp.float64)
