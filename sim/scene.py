@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
-from muslin.sim.overrides import set_value
+from muslin.sim.toml_values import read_values
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -136,16 +135,7 @@ class Scene(_Table):
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     """Read a scene file; `overrides` are `key=value`, dots for tables, TOML values (`body.beta=[2.0]`)."""
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"scene {path}: no such file; give the path of a scene's TOML file")
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"scene {path}: not valid TOML ({error}); correct the file") from error
-    for override in overrides:
-        set_value(values, override, "solver.dt=0.01")
-    return parse_scene(values, str(path))
+    return parse_scene(read_values(path, "scene", overrides, "solver.dt=0.01"), str(path))
 
 
 def parse_scene(values: dict[str, Any], source: str = "scene") -> Scene:

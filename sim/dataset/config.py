@@ -34,7 +34,6 @@ fraction = 0.1
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -42,7 +41,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
-from muslin.sim.overrides import set_value
+from muslin.sim.toml_values import read_values
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=60)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -163,16 +162,8 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> DatasetConfi
 
     Raises InputError naming file, key, value and what is allowed.
     """
-    file = Path(path)
-    try:
-        values = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not readable ({error}); give a TOML file of a dataset") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: not TOML: {error}") from error
-    for override in overrides:
-        set_value(values, override, "scene.fabric=gray-interlock")
-    return parse_config(values, str(file))
+    values = read_values(path, "dataset", overrides, "scene.fabric=gray-interlock")
+    return parse_config(values, str(path))
 
 
 def parse_config(values: dict[str, Any], source: str = "dataset") -> DatasetConfig:

@@ -1,11 +1,29 @@
-"""Overrides of a TOML file's values from the command line: `key=value`."""
+"""The values of a TOML file, with `key=value` overrides from the command line."""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from muslin.garments.errors import InputError
+
+
+def read_values(path: str | Path, kind: str, overrides: Sequence[str], example: str) -> dict[str, Any]:
+    """The values of the TOML file of a `kind`, each of `overrides` applied by `set_value`.
+
+    Raises InputError where the file cannot be read or is no TOML.
+    """
+    try:
+        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not readable ({error}); give the TOML file of a {kind}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML ({error}); correct the file") from error
+    for override in overrides:
+        set_value(values, override, example)
+    return values
 
 
 def set_value(values: dict[str, Any], override: str, example: str) -> None:
