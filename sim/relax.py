@@ -20,7 +20,7 @@ STILL_STEPS = 3
 POLISH_STEPS = 2
 POLISH_ITERATIONS = 20
 POLISH_TOLERANCE = 1.0e-6
-"""The last steps are solved this far, metres, so that the residual is that of the equilibrium and not of the solver."""
+"""The last steps are solved this far, metres, so that the residual is not the solver's."""
 
 
 @dataclass(frozen=True)

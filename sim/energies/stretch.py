@@ -15,8 +15,8 @@ so is not the gradient of any energy. The energy here is its work along the stra
 so that pulling along any fixed direction of strain reproduces the table, and the force is W's exact gradient.
 Where both principal strains are alike, theta has no meaning: dc turns to its mean over theta with
 a = S(min(1, (g1 - g2) / g1)), which is 1 in every uniaxial test. Between the measured angles the table is
-interpolated with S(u) = u^2 (3 - 2 u): straight lines would put kinks into W at every measured angle, where cloth
-comes to rest with forces that no solver can balance.
+interpolated with S(u) = u^2 (3 - 2 u): straight lines would put kinks into W at every measured angle, where
+cloth comes to rest with forces that no solver can balance.
 
 The Hessian is positive semi-definite by construction: tangent coefficients c_rest + (t + g t') dc clamped to
 be non-negative, and the geometric part of the positive principal stresses only.

@@ -13,7 +13,7 @@ from muslin.garments import catalogue
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.triangulate import triangulate
 
-wp.config.quiet = True
+wp.config.log_level = wp.LOG_WARNING
 
 FlatMesh = Callable[[ArrayLike, ArrayLike], GarmentMesh]
 
