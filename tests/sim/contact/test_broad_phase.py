@@ -1,0 +1,136 @@
+"""Every pair that comes within range is listed, once: against all pairs of random triangle soups."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from muslin.sim.cloth import build_cloth
+from muslin.sim.contact.system import ContactSettings, ContactSystem
+from muslin.sim.material import load_fabric
+
+RANGE, MARGIN = 2e-3, 2e-3
+
+
+def random_soup(count: int, seed: int, size: float = 0.02, box: float = 0.05) -> np.ndarray:
+    """(3 count, 3): triangles of about `size` with their centres in a box."""
+    draw = np.random.default_rng(seed)
+    corners = size * draw.normal(size=(count, 3, 3))
+    return (corners + box * draw.uniform(-1, 1, size=(count, 1, 3))).reshape(-1, 3)
+
+
+def all_pairs(soup, is_edge_edge: bool) -> np.ndarray:
+    """(K, 4): every pair of primitives of two triangles at least one of which is cloth."""
+    faces = np.arange(3 * soup.num_triangles).reshape(-1, 3)
+    first, second = np.meshgrid(np.arange(len(faces)), np.arange(len(faces)), indexing="ij")
+    cloth = soup.num_cloth // 3
+    keep = (first != second) & ((first < cloth) | (second < cloth))
+    if is_edge_edge:
+        keep &= first < second
+    a, b = faces[first[keep]], faces[second[keep]]
+    if not is_edge_edge:
+        return np.concatenate([np.column_stack([a[:, k], b]) for k in range(3)])
+    edges = [(0, 1), (1, 2), (2, 0)]
+    return np.concatenate([np.column_stack([a[:, e], b[:, f]]) for e in edges for f in edges])
+
+
+def keys(pairs: np.ndarray, is_edge_edge: bool) -> list[tuple]:
+    """The same key for the same two primitives, however their vertices are ordered."""
+    if is_edge_edge:
+        return [tuple(sorted([tuple(sorted(pair[:2])), tuple(sorted(pair[2:]))])) for pair in pairs.tolist()]
+    return [(pair[0], *sorted(pair[1:])) for pair in pairs.tolist()]
+
+
+def near(closest, soup, paths, is_edge_edge: bool, distance: float) -> set[tuple]:
+    """Pairs that are closer than `distance` in any of the configurations."""
+    pairs = all_pairs(soup, is_edge_edge)
+    hit = np.zeros(len(pairs), bool)
+    for points in paths:
+        hit |= closest(points[pairs], is_edge_edge)[1] < distance
+    return set(keys(pairs[hit], is_edge_edge))
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+@pytest.mark.parametrize(("cloth", "collider"), [(40, 0), (15, 25), (3, 150), (30, 1)])
+@pytest.mark.parametrize("speed", [0.0, 0.003, 0.05])
+def test_all_near_pairs_are_listed_once(make_soup, closest, cloth, collider, speed, is_edge_edge):
+    soup = make_soup(cloth, collider)
+    points = random_soup(cloth + collider, seed=cloth, box=0.02)
+    move = speed * np.random.default_rng(9).normal(size=points.shape)
+    soup.search(points, move)
+    listed = keys(soup.pairs(is_edge_edge), is_edge_edge)
+    path = [points + t * move for t in np.linspace(0, 1, 9)]
+    wanted = near(closest, soup, path, is_edge_edge, RANGE + MARGIN)
+    assert wanted
+    assert wanted <= set(listed)
+    assert len(set(listed)) == len(listed)
+    assert set(listed) <= set(keys(all_pairs(soup, is_edge_edge), is_edge_edge))
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_far_pairs_are_left_out(make_soup, closest, is_edge_edge):
+    soup = make_soup(20, 20)
+    points = random_soup(40, seed=1, size=0.005, box=0.2)
+    soup.search(points)
+    listed = len(soup.pairs(is_edge_edge))
+    assert listed < 0.05 * len(all_pairs(soup, is_edge_edge))
+
+
+def test_a_list_longer_than_its_room_grows(make_soup):
+    soup = make_soup(60, 0)
+    points = random_soup(60, seed=5, box=0.002)
+    room = [len(pairs.pairs) for pairs in soup.contact.lists]
+    soup.search(points)
+    for pairs, before in zip(soup.contact.lists, room, strict=True):
+        assert before < pairs.length <= len(pairs.pairs)
+    assert set(keys(soup.pairs(True), True)) <= set(keys(all_pairs(soup, True), True))
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_a_covered_move_needs_no_search_and_misses_nothing(make_soup, closest, is_edge_edge):
+    soup = make_soup(20, 20)
+    points = random_soup(40, seed=2)
+    soup.search(points)
+    searches = soup.contact._searches
+    draw = np.random.default_rng(4)
+    for _ in range(4):
+        move = draw.normal(size=points.shape)
+        move *= 0.12 * MARGIN / np.linalg.norm(move, axis=1, keepdims=True)
+        soup.contact.cover(soup.array(points), soup.array(move), 0.12 * MARGIN)
+        points = points + move
+        wanted = near(closest, soup, [points], is_edge_edge, RANGE)
+        assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
+    assert soup.contact._searches == searches
+    soup.contact.cover(soup.array(points), soup.array(0.0 * points), 0.12 * MARGIN)
+    assert soup.contact._searches == searches + 1
+
+
+def test_faces_switched_off_give_no_pairs(make_soup):
+    soup = make_soup(10, 10)
+    points = random_soup(20, seed=3)
+    soup.search(points)
+    before = [set(keys(soup.pairs(kind), kind)) for kind in (False, True)]
+    on = np.arange(10) % 2 == 0
+    soup.contact.mask(on)
+    soup.search(points)
+    off = set((soup.num_cloth + np.arange(30).reshape(-1, 3)[~on]).ravel().tolist())
+    for kind in (False, True):
+        kept = {key for key in before[kind] if off.isdisjoint(np.hstack(key).tolist())}
+        assert set(keys(soup.pairs(kind), kind)) == kept
+        assert kept < before[kind]
+    soup.contact.mask(np.ones(10, bool))
+    soup.search(points)
+    assert [set(keys(soup.pairs(kind), kind)) for kind in (False, True)] == before
+
+
+def test_neighbours_are_no_pairs(grid_mesh):
+    """Primitives that share a vertex touch by construction."""
+    mesh = grid_mesh(3, 3, 1e-3)
+    cloth = build_cloth(mesh, load_fabric("gray-interlock"))
+    contact = ContactSystem(cloth, np.zeros((0, 3), np.int32), 0, ContactSettings(), "cpu")
+    flat = np.insert(mesh.panel_vertices, 2, 0.0, axis=1)
+    x = wp.array(flat, dtype=wp.vec3d, device="cpu")
+    contact.search(x, wp.zeros_like(x))
+    for pairs in contact.lists:
+        listed = pairs.pairs.numpy()[: pairs.length]
+        assert len(listed) > 50
+        assert all(len(set(pair)) == 4 for pair in listed.tolist())
