@@ -97,7 +97,8 @@ def isotropic_fabric(
 
     Plane stress: s = E h / (1 - nu^2) [(1 - nu) G + nu tr(G) I], so c11 = c22 = E h / (2 (1 - nu^2)),
     c12 = nu c11, c33 = E h / (1 + nu). Bending rigidity B = E h^3 / (12 (1 - nu^2)); the hinge coefficient of
-    `muslin.sim.energies.bending` that a regular mesh needs for it is k = 2 B.
+    `muslin.sim.energies.bending` that a regular mesh needs for it is k = 4 B (E = B theta^2 / sqrt(3) a hinge
+    of equilateral triangles; Seung, Nelson 1988).
 
     `young` Pa, `thickness` m, `density` kg/m^2, `poisson` in (-1, 0.5].
     """
@@ -109,7 +110,7 @@ def isotropic_fabric(
     c11 = young * thickness / (2.0 * (1.0 - poisson**2))
     rest = np.array([c11, poisson * c11, c11, young * thickness / (1.0 + poisson)])
     rigidity = young * thickness**3 / (12.0 * (1.0 - poisson**2))
-    return Fabric(name, density, rest, np.tile(rest, (5, 1)), np.full((3, 5), 2.0 * rigidity))
+    return Fabric(name, density, rest, np.tile(rest, (5, 1)), np.full((3, 5), 4.0 * rigidity))
 
 
 def _admissible(c: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,6 +20,8 @@ Tick = Callable[[], None] | None
 MORPH_MOVE = 5.0e-3
 """Largest move of a body vertex, metres, in one step of a change of shape or pose at rest."""
 
+MORPH_DT = 1.0 / 30.0
+
 REST_POSE = np.zeros((24, 3))
 
 
@@ -55,15 +57,19 @@ class WornGarment:
         start = place(mesh, model, beta, body)
         bones = shrunk_body(model, beta, body, LEAST_GIRTH)
         self.sim = ClothSimulator(cloth, start, bones, model.faces, contact, solver, device)
-        grow_body(self.sim, model, beta, self.clearance.collider(body), tick)
+        grow_body(self.sim, model, beta, body, tick)
 
     def body(self) -> NDArray[np.float64]:
         """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""
         return self.model.vertices(self.beta, self.theta, self.translation)
 
+    def _collider(self) -> NDArray[np.float64]:
+        """What the cloth must meet where the body now stands."""
+        return self.clearance.collider(self.body(), self.sim.positions)
+
     def masked_faces(self) -> NDArray[np.int32]:
-        body = self.body()
-        return self.clearance.masked_faces(body, self.clearance.collider(body))
+        """Faces on which the collider, as it stands, differs from the body."""
+        return self.clearance.masked_faces(self.body(), self.sim.collider_vertices)
 
     def carry(self, theta: NDArray[np.float64], translation: NDArray[np.float64]) -> None:
         """Move body and garment together, as one rigid piece, to another root rotation and translation."""
@@ -84,7 +90,7 @@ class WornGarment:
             share = k / steps
             self.beta = (1.0 - share) * begin[0] + share * beta if k < steps else beta
             self.theta = (1.0 - share) * begin[1] + share * theta if k < steps else theta
-            self.sim.advance(self.clearance.collider(self.body()), 1.0 / 30.0, inertia=False)
+            self.sim.advance(self._collider(), MORPH_DT, inertia=False)
             if tick is not None:
                 tick()
 
@@ -93,7 +99,7 @@ class WornGarment:
         before = (self.theta, self.translation)
         self.theta, self.translation = theta, translation
         try:
-            self.sim.advance(self.clearance.collider(self.body()), dt)
+            self.sim.advance(self._collider(), dt)
         except Exception:
             self.theta, self.translation = before
             raise

@@ -2,7 +2,7 @@
 
 Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the
 body there, and only there: a vertex whose surroundings along its outward normal are taken by another part of
-the body within `ROOM` is drawn inwards,
+the body within `ROOM` is drawn inwards, where cloth is near,
 
     s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
 
@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse
 import warp as wp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 
@@ -28,6 +29,12 @@ since faces and vertices have different normals."""
 
 REACH = 0.08
 """Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
+
+NEAR_CLOTH = 0.03
+"""Metres: where no cloth is this near, the collider is the body."""
+
+SAME = 1.0e-8
+"""Metres below which collider and body do not differ: the rounding of a move that is made in parts."""
 
 MAX_HITS = 12
 
@@ -86,26 +93,35 @@ class SelfClearance:
         degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
         self._average = degree @ adjacency
 
-    def collider(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Vertices (N, 3) of the collider of a body in one pose, metres."""
+    def collider(self, vertices: NDArray[np.float64], cloth: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
+
+        A vertex moves only if there is cloth near it, and if every face around it passes
+        `masked_face_is_interior`: so the faces on which collider and body differ are fit to be masked.
+        """
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals)
-        gap = ROOM
-        inwards = np.where(free < 0.0, 0.5 * gap - free, 0.5 * np.maximum(gap - free, 0.0))
+        inwards = np.where(free < 0.0, 0.5 * ROOM - free, 0.5 * np.maximum(ROOM - free, 0.0))
         moved = inwards > 0.0
-        if not moved.any():
+        crowded = np.flatnonzero(moved)
+        distance, _ = cKDTree(cloth).query(vertices[crowded], distance_upper_bound=NEAR_CLOTH)
+        moved[crowded[~np.isfinite(distance)]] = False
+        faces = np.flatnonzero(moved[self.faces].any(axis=1))
+        if len(faces) == 0:
             return vertices
+        exposed = faces[~masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)]
+        moved[self.faces[exposed].ravel()] = False
+        inwards = np.where(moved, inwards, 0.0)
         for _ in range(3):
             inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
         return vertices - inwards[:, None] * normals
 
-    def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Indices of the faces on which `collider` differs from the body and that do lie within it."""
-        moved = (vertices != collider).any(axis=1)
-        faces = np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
-        return (
-            faces[masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)] if len(faces) else faces
-        )
+    def masked_faces(
+        self, vertices: NDArray[np.float64], collider: NDArray[np.float64]
+    ) -> NDArray[np.int32]:
+        """Indices of the faces on which `collider` differs from the body."""
+        moved = (np.abs(vertices - collider) > SAME).any(axis=1)
+        return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
 
     def _free_distance(
         self, vertices: NDArray[np.float64], normals: NDArray[np.float64]

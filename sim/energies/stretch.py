@@ -191,6 +191,10 @@ def respond(
             s11 += total[0]
             s22 += total[1]
             s12 += half * total[2]
+        else:
+            # No direction is the larger one: the mean of d1 over all of them.
+            s11 += dT * q
+            s22 += dT * q
         out.stress += strainv(s11, s22, s12)
         slope = zero
         if t < one:

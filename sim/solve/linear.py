@@ -9,13 +9,20 @@ from muslin.sim.cloth import ClothModel
 from muslin.sim.solve.block_matrix import BlockMatrix, add_diagonal
 from muslin.sim.solve.conjugate_gradients import Workspace, solve_serial
 from muslin.sim.solve.incomplete_cholesky import MAX_SHIFT, LowerFactor
+from muslin.sim.solve.parallel_gradients import solve_parallel
 
 
 class LinearSystem:
-    """Matrix A in the pattern of a cloth and the solution of A p = -g."""
+    """Matrix A in the pattern of a cloth and the solution of A p = -g.
 
-    def __init__(self, cloth: ClothModel, device: str, shift: float = 0.005) -> None:
+    On the CPU one serial kernel with incomplete Cholesky, on a GPU many `parallel` ones with block Jacobi.
+    """
+
+    def __init__(
+        self, cloth: ClothModel, device: str, shift: float = 0.005, parallel: bool | None = None
+    ) -> None:
         self.device = device
+        self.parallel = wp.get_device(device).is_cuda if parallel is None else parallel
         n = cloth.num_vertices
         offsets, columns = cloth.pattern
         rows = np.repeat(np.arange(n), np.diff(offsets))
@@ -44,6 +51,7 @@ class LinearSystem:
             setattr(w, name, wp.zeros(n, dtype=wp.vec3d, device=device))
         self.work = w
         self.report = wp.zeros(4, dtype=wp.float64, device=device)
+        self.scalars = wp.zeros(5, dtype=wp.float64, device=device)
 
     def clear(self) -> None:
         self.matrix.values.zero_()
@@ -62,6 +70,9 @@ class LinearSystem:
 
     def solve(self, gradient: wp.array, p: wp.array, tolerance: float, max_iterations: int) -> int:
         """Fill p's first V entries; returns the number of iterations."""
+        if self.parallel:
+            scratch = (self.work, self.factor.inverse, self.scalars)
+            return solve_parallel(self.matrix, gradient, p, *scratch, tolerance, max_iterations)
         args = [self.matrix, self.factor, gradient, p, self.work, self.shift, tolerance, max_iterations]
         args.append(self.report)
         wp.launch(solve_serial, 1, args, device=self.device)
