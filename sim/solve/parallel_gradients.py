@@ -1,9 +1,9 @@
 """Block-Jacobi preconditioned conjugate gradients for A p = -g as many small kernels, for the GPU.
 
 The iteration and its stop rule are those of `muslin.sim.solve.conjugate_gradients`; only the preconditioner
-differs, since an incomplete factorisation is a serial recurrence. Scalars stay on the device and are read back
-once every `CHECK_EVERY` iterations. Sums are accumulated with atomics, so that on a GPU the last bits vary from
-run to run.
+differs, since an incomplete factorisation is a serial recurrence. Scalars stay on the device and are read
+back once every `CHECK_EVERY` iterations. Sums are accumulated with atomics, so that on a GPU the last bits
+vary from run to run.
 """
 
 import warp as wp
