@@ -18,7 +18,7 @@ export MKL_NUM_THREADS := 1
 .PHONY: help demo test lint wheel clean
 
 help:
-	@echo 'make demo    generate, verify and report scenes/demo.toml into out/demo'
+	@echo 'make demo    generate, verify, score and report scenes/demo.toml into out/demo'
 	@echo 'make test    run every test'
 	@echo 'make lint    ruff and mypy'
 	@echo 'make wheel   build dist/muslin-*.whl'
@@ -27,6 +27,9 @@ help:
 demo: $(VENV)/installed-core
 	$(BIN)/muslin generate scenes/demo.toml --out out/demo/dataset --workers 2
 	$(BIN)/muslin verify out/demo/dataset --json out/demo/verified.json
+	$(BIN)/muslin generate scenes/demo.toml --out out/demo/coarse --workers 2 \
+	  --set name=demo_coarse --set kind=drape --set scene.garment.edge_length=0.03
+	$(BIN)/muslin eval out/demo/coarse out/demo/dataset --json out/demo/scores.json --html out/demo/scores.html
 	$(BIN)/muslin report out/demo/dataset --verification out/demo/verified.json --html out/demo/report.html
 
 # Processes that start with a cold kernel cache would each compile every kernel: one compiles first.
