@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.model import BodyModel
+from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.solve.simulator import ClothSimulator
 
 TORSO_DEPTH_TO_WIDTH = 0.6
@@ -158,10 +159,12 @@ def _around_arm(
 def _half_widths(flat: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Up to `count` rising heights and the half widths of a panel there: those of its widest vertices near.
 
-    A short panel of large triangles has heights that no vertex is near; they are left out.
+    A short panel of large triangles has heights that no vertex is near, or only one on its centre line; they
+    are left out.
     """
     x, y = flat.T
     bins = np.linspace(y.min(), y.max(), count)
     near = np.abs(y - bins[:, None]) <= bins[1] - bins[0]
-    held = near.any(axis=1)
-    return bins[held], np.where(near, np.abs(x), 0.0).max(axis=1)[held]
+    width = np.where(near, np.abs(x), 0.0).max(axis=1)
+    held = width > 1e-6 * width.max()
+    return bins[held], width[held]
