@@ -46,8 +46,16 @@ def grow_body(
     """Let the seams of a placed garment contract, then grow the body from its skeleton to `vertices`.
 
     `sim` holds the garment of `place` around `shrunk_body(..., LEAST_GIRTH)`. Weightless and without
-    friction, so that the garment finds its own place on the body.
+    friction, so that the garment finds its own place on the body. InputError where it does not enclose the
+    skeleton: no step could bring it around.
     """
+    counts = count_intersections(sim.positions, sim.cloth.faces, sim.collider_vertices, model.faces)
+    if counts.cloth_cloth or counts.cloth_body:
+        raise InputError(
+            f"the garment cannot be put on: placed around the skeleton of body {model.name!r} it has "
+            f"{counts.cloth_body} intersections with it and {counts.cloth_cloth} with itself; use a smaller "
+            "garment.edge_length or a wider garment"
+        )
     sim.set_gravity((0.0, 0.0, 0.0))
     for step in range(RELAX_STEPS + GROW_STEPS):
         share = max(0, step + 1 - RELAX_STEPS) / GROW_STEPS
