@@ -1,0 +1,94 @@
+"""Two spheres as one mesh: the collider makes room where they overlap, and is the body where they do not."""
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+
+from muslin.sim.body.interior import MASK_GAP_M, interior_points, masked_face_is_interior
+from muslin.sim.contact.clearance import ROOM, SelfClearance
+from muslin.sim.dataset.intersections import count_intersections
+
+RADIUS = 0.1
+BALL = trimesh.creation.icosphere(4, RADIUS)
+ANGLE, SPAN = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 6.2, 80), np.linspace(0, 0.09, 19)))
+CLOTH = np.stack([0.0 * SPAN, SPAN * np.cos(ANGLE), SPAN * np.sin(ANGLE)], axis=1)
+"""A disc between the spheres."""
+
+
+def two_spheres(gap: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of two spheres, left first, `gap` apart (negative: overlapping) along x."""
+    far = np.array([RADIUS + 0.5 * gap, 0, 0])
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3]
+    vertices = np.concatenate([BALL.vertices - far, BALL.vertices @ turn.T + far])
+    return vertices, np.concatenate([BALL.faces, BALL.faces + len(BALL.vertices)]).astype(np.int32)
+
+
+def room_between(collider: np.ndarray, faces: np.ndarray) -> float:
+    """Smallest distance between the collider's two parts, metres."""
+    n, m = len(BALL.vertices), len(BALL.faces)
+    others = faces[m:].astype(np.int64) - n
+    squared = igl.point_mesh_squared_distance(collider[:n], np.ascontiguousarray(collider[n:]), others)[0]
+    return float(np.sqrt(squared.min()))
+
+
+@pytest.mark.parametrize("gap", [0.5, 0.02, 2 * ROOM])
+def test_spheres_apart_are_left_bit_for_bit(gap):
+    vertices, faces = two_spheres(gap)
+    clearance = SelfClearance(vertices, faces, "cpu")
+    collider = clearance.collider(vertices, CLOTH)
+    assert collider.tobytes() == vertices.tobytes()
+    assert len(clearance.masked_faces(vertices, collider)) == 0
+
+
+@pytest.mark.parametrize(("gap", "room"), [(0.0, 2e-4), (-0.002, 1e-3), (-0.01, 2e-3), (-0.03, 1.5e-3)])
+def test_overlapping_spheres_leave_room_for_cloth(gap, room):
+    """Less than `ROOM` where triangles as coarse as these meet: only faces fit to be masked move."""
+    vertices, faces = two_spheres(gap)
+    n, m = len(BALL.vertices), len(BALL.faces)
+    clearance = SelfClearance(vertices, faces, "cpu")
+    collider = clearance.collider(vertices, CLOTH)
+    counts = count_intersections(collider[:n], faces[:m], collider[n:], faces[m:] - n)
+    assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)
+    assert room_between(collider, faces) > room
+
+    moved = (collider != vertices).any(axis=1)
+    assert not interior_points(collider[n:], faces[m:] - n, collider[:n]).any()
+    assert not interior_points(collider[:n], faces[:m], collider[n:]).any()
+    assert 0 < moved.sum() < 0.5 * len(vertices)
+    # Drawn inwards by half the room and, obliquely, by what it is inside.
+    assert np.linalg.norm(collider - vertices, axis=1).max() <= 0.5 * ROOM + 1.5 * -gap + 1e-4
+
+
+@pytest.mark.parametrize("gap", [0.0, -0.01])
+def test_without_cloth_nearby_the_collider_is_the_body(gap):
+    vertices, faces = two_spheres(gap)
+    far = CLOTH + np.array([0, 0.5, 0])
+    collider = SelfClearance(vertices, faces, "cpu").collider(vertices, far)
+    assert collider.tobytes() == vertices.tobytes()
+
+
+@pytest.mark.parametrize("gap", [0.0, -0.002, -0.01, -0.03])
+def test_masked_faces_pass_the_test_of_the_verification(gap):
+    vertices, faces = two_spheres(gap)
+    clearance = SelfClearance(vertices, faces, "cpu")
+    collider = clearance.collider(vertices, CLOTH)
+    masked = clearance.masked_faces(vertices, collider)
+    assert len(masked) > 0
+    assert masked.dtype == np.int32
+    assert masked_face_is_interior(vertices, faces, masked, MASK_GAP_M).all()
+    # Every face that the collider shows differently is masked: no cloth can get behind an unmasked one.
+    touched = np.flatnonzero((np.abs(vertices - collider) > 1e-8).any(axis=1)[faces].any(axis=1))
+    assert set(touched) == set(masked.tolist())
+
+
+def test_collider_moves_smoothly_as_the_spheres_meet():
+    gaps = np.linspace(0.012, -0.012, 49)
+    clearance = SelfClearance(*two_spheres(1.0), "cpu")
+    colliders = []
+    for gap in gaps:
+        vertices, _ = two_spheres(gap)
+        colliders.append(clearance.collider(vertices, CLOTH))
+    step = np.abs(np.diff(gaps)).max()
+    jumps = np.linalg.norm(np.diff(colliders, axis=0), axis=2)
+    assert jumps.max() < 12 * step, "no vertex may leap: cloth could not follow"
