@@ -1,7 +1,7 @@
 """Every file of scenes/ at reduced size: what it expects must hold, and so must a verification of its own.
 
-Reduced means coarse triangles, a time step a frame, a tenth of a second of motion, a drape that settles for a
-few steps only, the first and last shape of a sweep. Expectations are the file's own, with three exceptions.
+Reduced means coarse triangles, a time step a frame, three frames of motion, a drape that settles
+for a few steps only, the first and last shape of a sweep. Expectations are the file's own, but for three:
 `frames` becomes the number of frames of the shortened motion. `residual` and `at_rest` tell of cloth that was
 given the time to come to rest: they are asked where the whole time was given, over a sphere. A dataset's
 expectations hold for each of its samples.
@@ -26,9 +26,9 @@ from muslin.sim.run import simulate_chain
 from muslin.sim.scene import ExpectTable, Scene, load_scene, parse_scene
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
-EDGE_LENGTH = 0.06
-SECONDS = 0.1
-SETTLE_STEPS = 12
+EDGE_LENGTH = 0.065
+SECONDS = 0.07
+SETTLE_STEPS = 6
 TIME_STEP = 0.034  # one step a frame of 30 a second
 USERS_OWN = "user_smpl_amass"
 
