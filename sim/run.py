@@ -62,9 +62,14 @@ def simulate_chain(
     open_device(device)
     first = scenes[0]
     for scene in scenes[1:]:
-        same = scene.garment == first.garment and scene.fabric == first.fabric
-        if not same or scene.fabric_scale != first.fabric_scale:
-            raise InputError(f"scene {scene.name}: a chain shares garment and fabric; start another chain")
+        different = [key for key, value in _shared(scene).items() if value != _shared(first)[key]]
+        if different:
+            raise InputError(
+                f"scene {scene.name}: {', '.join(different)} differ from scene {first.name}'s; "
+                "scenes of a chain share them: start another chain"
+            )
+        if scene.motion is not None or first.motion is not None:
+            raise InputError(f"scene {scene.name}: a sequence starts from its own dressing; give it alone")
     mesh = cut_garment(first)
     scale = first.fabric_scale
     cloth = build_cloth(mesh, load_fabric(first.fabric).scaled(scale.density, scale.stretch, scale.bend))
@@ -75,14 +80,15 @@ def simulate_chain(
         return
     model = load_body(first.body.model)
     started = time.perf_counter()
+    clip = None if first.motion is None else _clip(first, model)
     contact, solver = _settings(first)
     worn = WornGarment(mesh, cloth, model, _beta(first, model), contact, solver, device, work.tick)
     work.finish(DRESS_WORK)
     for scene in scenes:
-        if scene.motion is None:
+        if clip is None:
             yield _drape(scene, mesh, cloth, worn, work, started)
         else:
-            yield _sequence(scene, mesh, cloth, worn, work, started)
+            yield _sequence(scene, mesh, cloth, worn, clip, work, started)
         started = time.perf_counter()
 
 
@@ -124,7 +130,7 @@ class _Work:
     def finish(self, work: int) -> None:
         """A stage planned as `work` steps is over, however many it took."""
         self.goal += work
-        self.done = min(self.goal, self.total) - 1
+        self.done = max(self.done, min(self.goal, self.total) - 1)
         self.tick()
 
 
@@ -180,16 +186,34 @@ def _drape(
     return _sample(scene, mesh, cloth, worn, [worn.sim.positions], [_state(worn)], rest, started)
 
 
+def _shared(scene: Scene) -> dict[str, object]:
+    """What all scenes of a chain have in common."""
+    body = None if scene.body is None else scene.body.model
+    own = {"name", "motion", "seed", "expect", "body", "collider"}
+    return {"body.model": body, **{key: getattr(scene, key) for key in Scene.model_fields if key not in own}}
+
+
+def _clip(scene: Scene, model: BodyModel) -> Motion:
+    """The motion of a scene on its body."""
+    assert scene.motion is not None
+    m = scene.motion
+    beta = _beta(scene, model)
+    clip = fit_to_body(load_motion(m.clip), model, beta)
+    clip = clip.clip(m.start, clip.duration if m.end is None else m.end)
+    return spread_arms(clip, model, beta)[0] if m.spread_arms else clip
+
+
 def _sequence(
-    scene: Scene, mesh: GarmentMesh, cloth: ClothModel, worn: WornGarment, work: _Work, started: float
+    scene: Scene,
+    mesh: GarmentMesh,
+    cloth: ClothModel,
+    worn: WornGarment,
+    clip: Motion,
+    work: _Work,
+    started: float,
 ) -> Sample:
     assert scene.motion is not None
     m = scene.motion
-    beta = _beta(scene, worn.model)
-    clip = fit_to_body(load_motion(m.clip), worn.model, beta)
-    clip = clip.clip(m.start, clip.duration if m.end is None else m.end)
-    if m.spread_arms:
-        clip, _ = spread_arms(clip, worn.model, beta)
     substeps = int(np.ceil(1.0 / (m.fps * scene.solver.dt) - 1e-9))
     step_rate = m.fps * substeps
     way_in = lead_in(clip, LEAD_IN_SECONDS, step_rate)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from muslin.eval.cli.options import Device, Overrides, Workers, check_device
+
+if TYPE_CHECKING:
+    from muslin.sim.scene import ExpectTable
 
 
 def generate(
@@ -19,7 +23,8 @@ def generate(
 ) -> None:
     """Make every sample of a dataset that is not there yet.
 
-    Stop it at any moment; run it again and it goes on: a sample is there whole or not at all.
+    Stop it at any moment; run it again and it goes on: a sample is there whole or not at all. Exit code 3 if
+    samples could not be simulated, 1 if one does not keep what the file's [expect] says.
 
     \b
     Examples:
@@ -45,3 +50,24 @@ def generate(
             typer.echo(f"  {sample_id}: {reason}", err=True)
         typer.echo(f"muslin: {len(result.failed)} samples could not be simulated", err=True)
         raise typer.Exit(3)
+    unmet = _unmet(out, loaded.expect, result.made)
+    for line in unmet:
+        typer.echo(f"  {line}", err=True)
+    if unmet:
+        typer.echo(f"muslin: {len(unmet)} expectations of {config} are not met", err=True)
+        raise typer.Exit(1)
+
+
+def _unmet(root: Path, expect: ExpectTable, made: Sequence[str]) -> list[str]:
+    """What of `expect` the new samples do not keep, one sentence each."""
+    from muslin.sim.dataset.reader import open_dataset
+    from muslin.sim.expect import check_expectations
+    from muslin.sim.scene import parse_scene
+
+    dataset = open_dataset(root)
+    lines = []
+    for sample_id in made:
+        sample = dataset[sample_id]
+        scene = parse_scene(sample.scene).model_copy(update={"expect": expect})
+        lines += [f"{sample_id}: {violation}" for violation in check_expectations(scene, sample)]
+    return lines

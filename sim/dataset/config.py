@@ -41,6 +41,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
+from muslin.sim.scene import ExpectTable
 from muslin.sim.toml_values import read_values
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=60)]
@@ -154,7 +155,7 @@ class DatasetConfig(_Strict):
     fabrics: list[str] = []
     sequences: list[MotionClip] = []
     splits: dict[Name, Split] = {}
-    expect: dict[str, Any] = {}
+    expect: ExpectTable = ExpectTable()
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> DatasetConfig:

@@ -153,7 +153,13 @@ def test_worn_garments_do_not_lie_on_spheres():
 
 def test_chain_of_different_garments():
     scenes = [body_scene(), body_scene(name="other", garment=COARSE | {"preset": "tshirt"})]
-    with pytest.raises(InputError, match=r"scene other: a chain shares .*garment and .*fabric"):
+    with pytest.raises(InputError, match=r"scene other: garment differ from scene .*start another chain"):
+        next(simulate_chain(scenes))
+
+
+def test_chain_with_a_sequence():
+    scenes = [body_scene(), body_scene(name="other", motion={"clip": "walk", "end": 0.1})]
+    with pytest.raises(InputError, match=r"scene other: a sequence starts from its own dressing; give it alone"):
         next(simulate_chain(scenes))
 
 
