@@ -159,7 +159,7 @@ def test_chain_of_different_garments():
 
 def test_chain_with_a_sequence():
     scenes = [body_scene(), body_scene(name="other", motion={"clip": "walk", "end": 0.1})]
-    with pytest.raises(InputError, match=r"scene other: a sequence starts from its own dressing; give it alone"):
+    with pytest.raises(InputError, match=r"scene other: a sequence .* give it alone"):
         next(simulate_chain(scenes))
 
 
