@@ -32,13 +32,17 @@ def to_single(a: wp.vec3d, pad: wp.float64) -> wp.vec3:
 def sweep_vertices(
     x: wp.array(dtype=wp.vec3d),
     p: wp.array(dtype=wp.vec3d),
+    shift: wp.vec3d,
     low: wp.array(dtype=wp.vec3d),
     high: wp.array(dtype=wp.vec3d),
 ):
-    """Box of each vertex from x to x + p."""
+    """Box of each vertex from x to x + p - shift.
+
+    Whether two points come together does not depend on a motion they share, so the sweep may leave one out.
+    """
     i = wp.tid()
     a = x[i]
-    b = a + p[i]
+    b = a + p[i] - shift
     low[i] = box_low(a, b)
     high[i] = box_high(a, b)
 

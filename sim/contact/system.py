@@ -152,26 +152,29 @@ class ContactSystem:
         )
         self.body_edges.on.assign(alive.astype(np.int32))
 
-    def cover(self, x: wp.array, p: wp.array, reach: float) -> None:
+    def cover(self, x: wp.array, p: wp.array, reach: float, shared: NDArray[np.float64]) -> None:
         """Make sure that every pair that may come within range on the way from x to x + p is listed.
 
-        `reach` is the largest move |p_i|, metres. A search looks `margin` further than it must; while the
-        moves since then add up to no more than half of that, its list still holds.
+        `reach` is the largest move |p_i - shared|, metres, `shared` (3,) a motion that all vertices have in
+        common. A search looks `margin` further than it must; while the moves since then add up to no more
+        than half of that, its list still holds.
         """
         if 2.0 * (self._travelled + reach) <= self.settings.margin:
             self._travelled += reach
         else:
-            self.search(x, p)
+            self.search(x, p, shared)
 
-    def search(self, x: wp.array, p: wp.array) -> None:
+    def search(self, x: wp.array, p: wp.array, shared: NDArray[np.float64] | None = None) -> None:
         """List every pair that may come within range and `margin` on the way from x to x + p."""
+        shift = wp.vec3d() if shared is None else wp.vec3d(*shared)
         self._travelled = 0.0
         n = self.num_cloth + self.num_collider
-        wp.launch(sweep_vertices, n, [x, p, self.vertex_low, self.vertex_high], device=self.device)
+        bounds = [self.vertex_low, self.vertex_high]
+        wp.launch(sweep_vertices, n, [x, p, shift, *bounds], device=self.device)
         rebuild = self._searches % 50 == 0
         self._searches += 1
         for elements in (self.cloth_faces, self.cloth_edges, self.body_faces, self.body_edges):
-            elements.update(self.vertex_low, self.vertex_high, rebuild)
+            elements.update(*bounds, rebuild)
         radius = self.settings.range + self.settings.margin
         low = self.vertex_low.numpy()[: self.num_cloth].min(axis=0) - radius
         high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + radius

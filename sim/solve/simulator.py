@@ -273,7 +273,9 @@ class ClothSimulator:
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
         limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
         self.p.assign(p * limit)
-        self.contact.cover(self.x, self.p, limit * float(np.sqrt((p**2).sum(axis=1).max())))
+        shared = p[:n].mean(axis=0) if moving else np.zeros(3)
+        reach = float(np.sqrt(((p - shared) ** 2).sum(axis=1).max()))
+        self.contact.cover(self.x, self.p, limit * reach, limit * shared)
         return size, limit
 
     def _set_inertia(
