@@ -152,7 +152,9 @@ class ContactSystem:
         )
         self.body_edges.on.assign(alive.astype(np.int32))
 
-    def cover(self, x: wp.array, p: wp.array, reach: float, shared: NDArray[np.float64]) -> None:
+    def cover(
+        self, x: wp.array, p: wp.array, reach: float, shared: NDArray[np.float64] | None = None
+    ) -> None:
         """Make sure that every pair that may come within range on the way from x to x + p is listed.
 
         `reach` is the largest move |p_i - shared|, metres, `shared` (3,) a motion that all vertices have in
