@@ -28,7 +28,7 @@ demo: $(VENV)/installed-core
 	$(BIN)/muslin generate scenes/demo.toml --out out/demo/dataset --workers 2
 	$(BIN)/muslin verify out/demo/dataset --json out/demo/verified.json
 	$(BIN)/muslin generate scenes/demo.toml --out out/demo/coarse --workers 2 \
-	  --set name=demo_coarse --set kind=drape --set scene.garment.edge_length=0.03
+	  --set name=demo_coarse --set kind=drape --set scene.garment.edge_length=0.034
 	$(BIN)/muslin eval out/demo/coarse out/demo/dataset --json out/demo/scores.json --html out/demo/scores.html
 	$(BIN)/muslin report out/demo/dataset --verification out/demo/verified.json --html out/demo/report.html
 
