@@ -12,7 +12,9 @@ def open_device(name: str) -> None:
 
     Raises InputError unless `name` is a device of this machine.
     """
-    wp.config.log_level = wp.LOG_WARNING
+    # While it starts, Warp warns of every machine without a CUDA driver; the check below says what counts.
+    wp.config.log_level = wp.LOG_ERROR
     names = [str(device) for device in wp.get_devices()]
+    wp.config.log_level = wp.LOG_WARNING
     if name not in names:
         raise InputError(f"device {name!r}: not available here; choose one of {', '.join(names)}")
