@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 
+MAX_INDEX = int(np.iinfo(np.int32).max)
+
 
 @dataclass(frozen=True, eq=False)
 class ObjContent:
@@ -48,7 +50,7 @@ def read_obj(path: Path | str) -> ObjContent:
     for number, line in enumerate(text.splitlines(), start=1):
         try:
             parser.line(line.split())
-        except (ValueError, IndexError, json.JSONDecodeError) as error:
+        except (ValueError, TypeError, AttributeError, IndexError) as error:
             raise InputError(
                 f"{path}, line {number}: '{line.strip()[:60]}' cannot be read: {error}"
             ) from error
@@ -139,4 +141,6 @@ def _index(word: str, count: int) -> int:
     index = int(word)
     if index == 0 or index < -count:
         raise ValueError(f"index {index}; indices count from 1")
+    if index > MAX_INDEX:
+        raise ValueError(f"index {index}; the largest is {MAX_INDEX}")
     return index - 1 if index > 0 else count + index

@@ -87,6 +87,8 @@ def test_file_of_another_program_gets_panel_space_from_uv(tmp_path: Path) -> Non
         ("v 1 2\n", "line 1: 'v 1 2' cannot be read: too few numbers"),
         (TRIANGLE + "# muslin panel_vertex 0 0 0\nf 1/1 2/2 3/3\n", "the file is damaged"),
         (TRIANGLE + "# muslin garment tee {\n", "cannot be read"),
+        (TRIANGLE + "# muslin garment tee [1]\n", "cannot be read"),
+        (TRIANGLE + "f 1/1 2/2 99999999999/3\n", "line 7.*index 99999999999; the largest is"),
     ],
 )  # fmt: skip
 def test_wrong_files_are_refused(text: str, message: str, tmp_path: Path) -> None:
