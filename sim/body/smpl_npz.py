@@ -7,6 +7,7 @@ import zipfile
 import zlib
 from collections.abc import Collection
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,9 @@ def read_npz(path: Path, keys: Collection[str]) -> dict[str, Any]:
                 key = member.removesuffix(".npy")
                 if key in keys:
                     arrays[key] = _read_member(archive.read(member), f"{path}, {key}")
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError, RuntimeError) as error:
+    except (
+        zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError, RuntimeError, SyntaxError, TokenError
+    ) as error:  # fmt: skip
         raise InputError(
             f"{path}: no readable .npz archive ({error}); give an intact SMPL .npz file"
         ) from error

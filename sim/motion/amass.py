@@ -10,7 +10,9 @@ for it. The error, some centimetres, is constant over a clip, and `fit_to_body` 
 
 from __future__ import annotations
 
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +43,12 @@ _ALLOWED = (
     "allowed is an AMASS motion: .npz with `poses` (T, 156 SMPL-H, 165 SMPL-X or 72 SMPL) or "
     "`root_orient` (T, 3) + `pose_body` (T, 63), `trans` (T, 3) and `mocap_framerate`"
 )
+
+# What reading a damaged archive, or the text that heads its arrays, can raise.
+DAMAGE = (
+    OSError, ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error, SyntaxError,
+    tokenize.TokenError,
+)  # fmt: skip
 
 POSE_QUANTUM = 2.0**-13
 """Radians; clips are stored in multiples of it, which compress to about half their size."""
@@ -100,8 +108,9 @@ def _arrays(path: Path) -> dict[str, NDArray]:
             return {key: file[key] for key in wanted}
     except InputError:
         raise
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError) as error:
-        why = "it holds Python objects, which are never loaded" if "pickle" in str(error) else str(error)
+    except DAMAGE as error:
+        objects = "pickle" in str(error) and zipfile.is_zipfile(path)
+        why = "it holds Python objects, which are never loaded" if objects else str(error)
         raise InputError(
             f"{path}: cannot be read ({why}); {_ALLOWED}; save it anew without objects"
         ) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,27 @@ def test_a_damaged_array_is_refused(tmp_path: Path) -> None:
     data[2000] ^= 0xFF
     path.write_bytes(bytes(data))
     with pytest.raises(InputError, match=r"flip\.npz"):
+        read_amass(path)
+
+
+@pytest.mark.parametrize("offset", [60, 100, 140])
+def test_any_damage_to_a_compressed_motion_is_refused(tmp_path: Path, offset: int) -> None:
+    path = tmp_path / "dent.npz"
+    np.savez_compressed(path, **smplh())
+    data = bytearray(path.read_bytes())
+    data[offset : offset + 8] = b"\xff" * 8
+    path.write_bytes(bytes(data))
+    with pytest.raises(InputError, match=r"dent\.npz"):
+        read_amass(path)
+
+
+def test_a_header_that_is_no_python_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "header.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        for member in ("poses.npy", "trans.npy"):
+            header = b"{'descr': ('<f4', 'fortran_order': False\n"
+            archive.writestr(member, b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header)
+    with pytest.raises(InputError, match=r"header\.npz: cannot be read"):
         read_amass(path)
 
 
