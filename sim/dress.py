@@ -103,6 +103,11 @@ def place(
             f"garment {mesh.name!r}: cannot place panels {', '.join(sorted(unknown))} on a body; "
             "allowed are front, back, sleeve_left and sleeve_right"
         )
+    if "front" not in mesh.panel_names and set(mesh.panel_names) != {"back"}:
+        raise InputError(
+            f"garment {mesh.name!r}: sleeves are placed by the shoulder of a panel front, which it lacks; "
+            "add one to the pattern"
+        )
     joints = model.joints(beta)
     origin = np.array([0.0, _shoulder_height(vertices, joints) + 0.015, joints[LEFT_SHOULDER][2]])
     placed = np.zeros((len(mesh.panel_vertices), 3))

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from muslin.garments import catalogue
 from muslin.garments.errors import InputError
+from muslin.garments.pattern import Pattern
 from muslin.garments.triangulate import triangulate
 from muslin.sim.body import load_body
 from muslin.sim.cloth import build_cloth
@@ -118,6 +119,15 @@ def test_a_garment_that_cuts_through_the_skeleton_is_refused():
     cloth = build_cloth(mesh, load_fabric("gray-interlock"))
     with pytest.raises(InputError, match=r"'female' it has \d+ .* smaller garment\.edge_length"):
         WornGarment(mesh, cloth, model, betas(model, 0.0), ContactSettings(), SolverSettings(), "cpu")
+
+
+def test_sleeves_without_a_front_cannot_be_worn():
+    pattern = catalogue.get("tee").pattern()
+    alone = Pattern("sleeve", (pattern.panel("sleeve_left"),), ())
+    model = load_body("female")
+    beta = betas(model, 0.0)
+    with pytest.raises(InputError, match="'sleeve': sleeves are placed by the shoulder of a panel front"):
+        place(triangulate(alone, EDGE_LENGTH), model, beta, model.vertices(beta, np.zeros((24, 3))))
 
 
 def test_a_flat_sheet_cannot_be_worn():
