@@ -53,6 +53,13 @@ def make_parent(path: Path) -> Path:
     return path
 
 
+def check_place(path: Path) -> None:
+    """Raise InputError unless a folder can be made there: found out before long work, not after it."""
+    if not path.is_dir():
+        make_parent(path / "sample")
+        path.rmdir()
+
+
 def check_empty_folder(path: Path) -> Path:
     """Raise InputError if a folder for new output holds anything."""
     if path.is_file() or (path.is_dir() and any(path.iterdir())):

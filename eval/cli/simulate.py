@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from muslin.eval.cli.options import Device, Overrides, check_device, check_empty_folder
+from muslin.eval.cli.options import Device, Overrides, check_device, check_empty_folder, check_place
 
 
 def simulate(
@@ -31,6 +31,7 @@ def simulate(
     check_empty_folder(out)
     loaded = load_scene(scene, overrides or [])
     name = check_device(device)
+    check_place(out)
 
     from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.reader import write_dataset

@@ -40,7 +40,7 @@ def verify(
         f"{result.samples} samples, {result.frames} frames: "
         f"{result.cloth_cloth_intersections} cloth-cloth and {result.cloth_body_intersections} cloth-body "
         f"intersections, at most {result.masked_body_faces_max} body faces left out, "
-        f"{len(result.failed)} failed"
+        f"{len(result.failed)} failed" + (f", {result.missing} not made yet" if result.missing else "")
     )
     if result.failed:
         for sample_id, reason in result.failed.items():

@@ -13,6 +13,14 @@ from pathlib import Path
 from muslin.garments.errors import InputError
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it. Raises InputError if that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made ({error.strerror}); choose another place") from error
+
+
 def write_file(path: Path, data: bytes) -> None:
     """Replace a file in one step: readers see the old bytes or the new ones, never a part."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")

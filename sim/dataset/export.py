@@ -11,6 +11,7 @@ import trimesh
 from trimesh.visual import TextureVisuals
 
 from muslin.garments.errors import InputError
+from muslin.sim.dataset import durable
 from muslin.sim.dataset.parts import Part, sample_parts
 from muslin.sim.dataset.pc2 import write_pc2
 from muslin.sim.dataset.reader import open_dataset
@@ -64,7 +65,7 @@ def export_parts(
         if file.exists():
             raise InputError(f"{file}: exists; remove it, or export to another folder")
     for file, writer in files.items():
-        file.parent.mkdir(parents=True, exist_ok=True)
+        durable.make_folder(file.parent)
         partial = file.with_name(f"partial-{os.getpid()}-{file.name}")
         try:
             writer(partial)

@@ -113,8 +113,8 @@ def prepare_root(root: Path, header: Header) -> Header | None:
                 f"samples the new one has not; differs: {differs}; "
                 "write to another folder, or only extend the config"
             )
-    (root / SAMPLES).mkdir(parents=True, exist_ok=True)
-    (root / PARTIAL).mkdir(exist_ok=True)
+    durable.make_folder(root / SAMPLES)
+    durable.make_folder(root / PARTIAL)
     return before
 
 

@@ -131,6 +131,22 @@ def test_export_refuses_to_overwrite(dataset, tmp_path):
     refused("export", dataset, "--format", "max", "--out", tmp_path / "x", says="max")
 
 
+def test_output_in_a_place_that_cannot_be_is_refused(dataset, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    refused("export", dataset, "--out", tmp_path / "file" / "out", says="cannot be made")
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[body]\nmodel = "female"\n')
+    refused("simulate", scene, "--out", tmp_path / "file" / "out", says="cannot be made")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_verify_tells_what_is_not_made_yet(dataset):
+    header = json.loads((dataset / "muslin.json").read_text())
+    header["splits"]["planned"] = ""
+    (dataset / "muslin.json").write_text(json.dumps(header))
+    assert "0 failed, 1 not made yet" in muslin("verify", dataset, "--workers", 1).output
+
+
 def test_export_of_a_mesh_file(tmp_path):
     trimesh.creation.icosphere(1).export(tmp_path / "a.obj")
     muslin("export", tmp_path / "a.obj", "--format", "ply", "--out", tmp_path / "out")

@@ -43,6 +43,13 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path: Path) -> None
     assert file.read_text() == "mine"
 
 
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match=r"file/data/samples: cannot be made .* choose another place"):
+        prepare_root(tmp_path / "file" / "data", Header(config={}, splits={}))
+    assert (tmp_path / "file").read_text() == "mine"
+
+
 def test_a_folder_of_a_run_killed_before_its_header_is_taken_up(tmp_path: Path) -> None:
     prepare_root(tmp_path, HEADER)
     (tmp_path / ".muslin.json.77.tmp").write_text("{")
