@@ -105,6 +105,18 @@ def test_obj_sequences_need_a_rate_for_velocities(tmp_path):
     assert with_rate.figures["velocity_error_mm_s"]["mean"] == pytest.approx(10_000.0)
 
 
+def test_an_obj_sequence_against_a_dataset_asks_for_the_rate(tmp_path, make_sample):
+    sample = make_sample("a", frames=3)
+    write_dataset(tmp_path / "t", [sample])
+    for t, positions in enumerate(sample.positions):
+        mesh = trimesh.Trimesh(positions, sample.garment.faces, process=False)
+        (tmp_path / "p").mkdir(exist_ok=True)
+        mesh.export(tmp_path / f"p/{t}.obj")
+    with pytest.raises(InputError, match=rf"p: the frame rate .* --fps {sample.fps:g}$"):
+        compare(tmp_path / "p", tmp_path / "t")
+    assert compare(tmp_path / "p", tmp_path / "t", fps=sample.fps).frames == 3
+
+
 def test_few_surface_frames_are_said(tmp_path, make_sample):
     write_dataset(tmp_path / "t", [make_sample("a", frames=9)])
     result = compare(tmp_path / "t", tmp_path / "t", surface_frames=3)
