@@ -22,6 +22,7 @@ from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.processes import one_thread_each, usable_cores, worker_died
 from muslin.sim.dataset.schema import LOCK
 from muslin.sim.dataset.solver import solver_digest
+from muslin.sim.dataset.sources import check_sources
 from muslin.sim.dataset.worker import ChainSimulator, Task, make_chain, start_worker
 
 
@@ -63,8 +64,8 @@ def generate(
     make_scene   from the values of a scene file to a scene; `muslin.sim.scene.parse_scene` unless given
 
     A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a
-    scene that cannot be, for a folder that may not be written to (see `prepare_root`), and when a process
-    dies.
+    scene that cannot be or names what is not there, for a folder that may not be written to (see
+    `prepare_root`), and when a process dies.
     """
     root = Path(out)
     started = time.perf_counter()
@@ -72,6 +73,8 @@ def generate(
         raise InputError(f"workers = {workers}: must be 1 or more")
     planned = plan(config)
     scenes = _scenes(planned, make_scene or _default_make_scene())
+    if make_scene is None:
+        check_sources(scene for chain in scenes for scene in chain)
     solver = solver_digest(simulate)
     header = Header(config=config.model_dump(mode="json"), splits=planned.splits, solver_digest=solver)
     before = prepare_root(root, header)

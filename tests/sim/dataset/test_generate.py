@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sheet_producer import files_of, make_scene, sheets_config, simulate
@@ -115,6 +116,28 @@ def test_a_scene_that_cannot_be_is_refused_before_anything_is_written(tmp_path: 
         run(config, tmp_path / "data")
     with pytest.raises(InputError, match="workers = 0"):
         run(sheets_config(), tmp_path / "data", workers=0)
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"scene": {"body": {"model": "none.pkl"}}}, r"none\.pkl does not exist"),
+        (
+            {"scene": {"body": {"model": "female"}, "garment": {"pattern": "none.json"}}},
+            r"none\.json: cannot be",
+        ),
+        ({"scene": {"body": {"model": "female"}, "garment": {"preset": "cape"}}}, "no preset 'cape'"),
+        ({"kind": "sequence", "sequences": [{"clip": "stroll"}]}, "motion 'stroll' is unknown"),
+        ({"kind": "sequence", "sequences": [{"clip": "walk", "end": 900.0}]}, "cannot clip from 0"),
+    ],
+)
+def test_what_a_scene_names_must_be_there_before_anything_is_written(
+    tmp_path: Path, values: dict[str, Any], says: str
+) -> None:
+    config = parse_config({"kind": "drape", "scene": {"body": {"model": "female"}}} | values)
+    with pytest.raises(InputError, match=says):
+        generate(config, tmp_path / "data")
     assert not (tmp_path / "data").exists()
 
 
