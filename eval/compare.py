@@ -189,7 +189,8 @@ def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairSc
         if prediction.fps is None or truth.fps is None:
             unknown = prediction if prediction.fps is None else truth
             raise InputError(
-                f"{unknown.name}: the frame rate of mesh files is not known; give it with --fps, for example --fps {prediction.fps or truth.fps:g}"
+                f"{unknown.name}: the frame rate of mesh files is not known; "
+                f"give it with --fps, for example --fps {prediction.fps or truth.fps:g}"
             )
         raise InputError(
             f"{prediction.name} has {prediction.fps} frames per second and {truth.name} has {truth.fps}; "
