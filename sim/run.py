@@ -82,7 +82,10 @@ def simulate_chain(
     started = time.perf_counter()
     clip = None if first.motion is None else _clip(first, model)
     contact, solver = _settings(first)
-    worn = WornGarment(mesh, cloth, model, _beta(first, model), contact, solver, device, work.tick)
+    try:
+        worn = WornGarment(mesh, cloth, model, _beta(first, model), contact, solver, device, work.tick)
+    except SimulationError as error:
+        raise SimulationError(f"scene {first.name}, dressing: {error}") from error
     work.finish(DRESS_WORK)
     for scene in scenes:
         if clip is None:

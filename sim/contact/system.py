@@ -176,7 +176,7 @@ class ContactSystem:
         rebuild = self._searches % 50 == 0
         self._searches += 1
         for elements in (self.cloth_faces, self.cloth_edges, self.body_faces, self.body_edges):
-            elements.update(*bounds, rebuild)
+            elements.update(self.vertex_low, self.vertex_high, rebuild)
         radius = self.settings.range + self.settings.margin
         low = self.vertex_low.numpy()[: self.num_cloth].min(axis=0) - radius
         high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + radius
@@ -252,9 +252,6 @@ class ContactSystem:
     def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
         """Freeze the contacts at x, which the last search must cover, for this step's friction."""
         self._list_active(x)
-        if self.num_friction > len(self.friction.force):
-            self._reserve_friction(2 * self.num_friction)
-            self._list_active(x)
         if not friction:
             self.num_friction = 0
         self.friction.num_cloth = self.num_cloth
@@ -263,7 +260,10 @@ class ContactSystem:
         self.friction.slip = self.settings.slip_speed * dt
 
     def smallest_distance(self, x: wp.array) -> float:
-        """Smallest distance among the listed pairs, m; infinity where none is listed."""
+        """Smallest distance among the listed pairs, m; infinity where none is listed.
+
+        Lists contacts anew: friction is that of x until the next `begin_step`.
+        """
         self._list_active(x)
         return float(self.nearest.numpy()[0])
 
@@ -296,6 +296,9 @@ class ContactSystem:
                 args += [f.pairs, f.weights, f.normal, f.force, self.nearest]
                 wp.launch(active_pairs, pairs.length, args, device=self.device)
         self.num_friction = int(self._friction_count.numpy()[0])
+        if self.num_friction > len(self.friction.force):
+            self._reserve_friction(2 * self.num_friction)
+            self._list_active(x)
 
     def _reserve_friction(self, capacity: int) -> None:
         self.friction.pairs = wp.zeros(capacity, dtype=wp.vec4i, device=self.device)

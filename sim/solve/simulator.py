@@ -249,8 +249,10 @@ class ClothSimulator:
                     continue
                 iterations += 1
                 report.last_move = step * limit * size
-                report.converged = report.last_move < s.tolerance
-                if (report.converged and iterations >= s.min_iterations) or iterations >= s.max_iterations:
+                report.converged = size < s.tolerance
+                solved = report.converged and iterations >= s.min_iterations
+                # A direction along which nothing can be gained would come out the same again.
+                if solved or step == 0.0 or iterations >= s.max_iterations:
                     break
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
         return True

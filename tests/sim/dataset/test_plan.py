@@ -43,7 +43,8 @@ def test_ids_follow_all_that_makes_the_geometry() -> None:
         {"scene": {"fabric": "denim", "solver": {"dt": 0.01}}},
     ):
         assert first.isdisjoint(job.id for job in planned(**(base | change)).jobs)
-    unaffected = {"seed": 9, "name": "other", "splits": {"test": {"shapes": ["h-000"]}}, "expect": {"residual": 0.1}}
+    unaffected = {"seed": 9, "name": "other", "splits": {"test": {"shapes": ["h-000"]}}}
+    unaffected["expect"] = {"residual": 0.1}
     assert first == {job.id for job in planned(**(base | unaffected)).jobs}
     assert first == {job.id for job in planned(**(base | {"scene": {"fabric": "denim", "expect": {}}})).jobs}
 
