@@ -19,7 +19,7 @@ class Certificate:
 
     cloth_cloth_intersections    pairs (edge, triangle) of the cloth that cross
     cloth_body_intersections     pairs (edge, triangle), one of cloth and one of unmasked body, that cross
-    min_distance_m               smallest distance of cloth to itself (not adjacent) or to the collider, metres,
+    min_distance_m               smallest distance of cloth to itself (not adjacent) or the collider, metres,
                                  as the solver saw it; only pairs within its contact range count
     masked_body_faces_max        most faces of the body left out of contact in any frame
     force_residual               largest norm of the residual force, as a share of the garment's weight
