@@ -28,11 +28,14 @@ def export(
       muslin export mesh.obj --format ply --out out/ply
     """
     from muslin.eval.cli.progress import progress_bar
+    from muslin.eval.meshes import check_mesh
     from muslin.sim.dataset.export import export_dataset, export_parts
     from muslin.sim.dataset.parts import read_mesh
 
     if source.is_file():
-        files = export_parts(source.stem, [read_mesh(source)], None, out, file_format)
+        mesh = read_mesh(source)
+        check_mesh(mesh.positions, mesh.faces, str(source))
+        files = export_parts(source.stem, [mesh], None, out, file_format)
     else:
         with progress_bar("export") as update:
             files = export_dataset(source, out, file_format, ids=samples or None, body=body, progress=update)

@@ -124,6 +124,13 @@ def test_report_shows_and_cites_the_verification(dataset, tmp_path):
         assert outside not in page
 
 
+def test_export_refuses_a_mesh_that_is_not_manifold(tmp_path):
+    fan = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"
+    (tmp_path / "fan.obj").write_text(fan)
+    refused("export", tmp_path / "fan.obj", "--format", "ply", "--out", tmp_path / "x", says="not manifold")
+    assert not (tmp_path / "x").exists()
+
+
 def test_export_refuses_to_overwrite(dataset, tmp_path):
     muslin("export", dataset, "--format", "obj", "--out", tmp_path / "obj", "--sample", "still")
     assert (tmp_path / "obj" / "still_cloth.obj").is_file()
