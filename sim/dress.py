@@ -22,6 +22,9 @@ TORSO_DEPTH_TO_WIDTH = 0.6
 SHOULDER_ROUNDING = 0.12
 """Metres below the shoulder line within which front and back part from each other."""
 
+SHOULDER_SEAM_DROP = 0.1225
+"""Metres below the neck point within which the outermost vertex of a front panel is the shoulder's tip."""
+
 LEAST_GIRTH = 0.03
 """Share of its girth that the body has before it grows."""
 
@@ -120,7 +123,7 @@ def place(
             left = name == "sleeve_left"
             shoulder = joints[LEFT_SHOULDER if left else RIGHT_SHOULDER]
             tip = mesh.panel_vertices[mesh.panel_vertex_panel == mesh.panel_names.index("front")]
-            placed[here] = _around_arm(flat, shoulder, float(_shoulder_tip(tip)), 1.0 if left else -1.0)
+            placed[here] = _around_arm(flat, shoulder, _shoulder_tip(tip), 1.0 if left else -1.0)
     count = np.bincount(mesh.panel_to_vertex, minlength=mesh.num_vertices)
     total = [np.bincount(mesh.panel_to_vertex, placed[:, k], minlength=mesh.num_vertices) for k in range(3)]
     return np.stack(total, axis=1) / count[:, None]
@@ -135,7 +138,7 @@ def _shoulder_height(vertices: NDArray[np.float64], joints: NDArray[np.float64])
 
 def _shoulder_tip(front: NDArray[np.float64]) -> float:
     """x of the outer end of the shoulder seam of a front panel."""
-    upper = front[front[:, 1] > -0.35 * SHOULDER_ROUNDING / 0.12 * 0.35]
+    upper = front[front[:, 1] > -SHOULDER_SEAM_DROP]
     return float(upper[:, 0].max())
 
 
