@@ -326,7 +326,7 @@ def _flat_above(mesh: GarmentMesh, scene: Scene) -> NDArray[np.float64]:
     if len(mesh.panel_names) != 1:
         raise InputError(
             f"garment {mesh.name!r} has {len(mesh.panel_names)} panels; over a sphere goes one flat panel: "
-            "use design = \"sheet\""
+            'use design = "sheet"'
         )
     flat = np.zeros((mesh.num_vertices, 2))
     flat[mesh.panel_to_vertex] = mesh.panel_vertices

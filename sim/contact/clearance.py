@@ -116,9 +116,7 @@ class SelfClearance:
             inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
         return vertices - inwards[:, None] * normals
 
-    def masked_faces(
-        self, vertices: NDArray[np.float64], collider: NDArray[np.float64]
-    ) -> NDArray[np.int32]:
+    def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
         """Indices of the faces on which `collider` differs from the body."""
         moved = (np.abs(vertices - collider) > SAME).any(axis=1)
         return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)

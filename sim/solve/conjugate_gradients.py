@@ -3,6 +3,8 @@
 The iteration stops when the quadratic model q(p) = p.A p / 2 + g.p no longer falls enough: after at least 8
 iterations, when the last decrease times their number is below `tolerance` times the whole decrease.
 
+Fixed vertices keep the p they are told: their residual is zero throughout, and so is every direction there.
+
 Source: Nash, Sofer 1990, "Assessing a search direction within a truncated-Newton method".
 """
 
@@ -13,6 +15,9 @@ from muslin.sim.solve.incomplete_cholesky import LowerFactor, apply_inverse, fac
 
 wp.set_module_options({"enable_backward": False})
 
+HELD = wp.constant(wp.float64(1.0e9))
+"""N/m on the diagonal of fixed vertices."""
+
 
 @wp.struct
 class Workspace:
@@ -22,11 +27,23 @@ class Workspace:
     q: wp.array(dtype=wp.vec3d)
 
 
+@wp.func
+def multiply(matrix: BlockMatrix, extras: int, x: wp.array(dtype=wp.vec3d), out: wp.array(dtype=wp.vec3d)):
+    """out = A x"""
+    for i in range(matrix.diagonal.shape[0]):
+        out[i] = row_product(matrix, i, x)
+    for e in range(extras):
+        ij = matrix.extra_index[e]
+        out[ij[0]] = out[ij[0]] + matrix.extra_values[e] * x[ij[1]]
+
+
 @wp.kernel
 def solve_serial(
     matrix: BlockMatrix,
     factor: LowerFactor,
+    fixed: wp.array(dtype=wp.int32),
     gradient: wp.array(dtype=wp.vec3d),
+    told: wp.array(dtype=wp.vec3d),
     p: wp.array(dtype=wp.vec3d),
     work: Workspace,
     shift: wp.float64,
@@ -37,25 +54,36 @@ def solve_serial(
     """Launch with dim = 1. report = [iterations, shift used, q(p), |r| at the end / |g|]."""
     n = matrix.diagonal.shape[0]
     extras = wp.min(matrix.extra_count[0], matrix.extra_index.shape[0])
-    used = factorise(matrix, factor, shift)
-    start = wp.float64(0.0)
+    any_fixed = int(0)
     for i in range(n):
         work.r[i] = -gradient[i]
         p[i] = wp.vec3d()
-        start += wp.length_sq(gradient[i])
+        if fixed[i] != 0:
+            any_fixed = 1
+            p[i] = told[i]
+            # As good as infinite beside any stiffness of cloth: the factor decouples the vertex.
+            k = matrix.diagonal[i]
+            matrix.values[k] = matrix.values[k] + wp.identity(n=3, dtype=wp.float64) * HELD
+    if any_fixed == 1:
+        multiply(matrix, extras, p, work.q)
+        for i in range(n):
+            work.r[i] = work.r[i] - work.q[i]
+            if fixed[i] != 0:
+                work.r[i] = wp.vec3d()
+    used = factorise(matrix, factor, shift)
+    start = wp.float64(0.0)
     apply_inverse(factor, work.r, work.z)
     rz = wp.float64(0.0)
     for i in range(n):
+        if fixed[i] != 0:
+            work.z[i] = wp.vec3d()
+        start += wp.length_sq(work.r[i])
         work.d[i] = work.z[i]
         rz += wp.dot(work.r[i], work.z[i])
     decrease = wp.float64(0.0)
     iterations = int(0)
     while iterations < max_iterations and rz > wp.float64(0.0):
-        for i in range(n):
-            work.q[i] = row_product(matrix, i, work.d)
-        for e in range(extras):
-            ij = matrix.extra_index[e]
-            work.q[ij[0]] = work.q[ij[0]] + matrix.extra_values[e] * work.d[ij[1]]
+        multiply(matrix, extras, work.d, work.q)
         dq = wp.float64(0.0)
         for i in range(n):
             dq += wp.dot(work.d[i], work.q[i])
@@ -64,7 +92,8 @@ def solve_serial(
         alpha = rz / dq
         for i in range(n):
             p[i] = p[i] + work.d[i] * alpha
-            work.r[i] = work.r[i] - work.q[i] * alpha
+            if fixed[i] == 0:
+                work.r[i] = work.r[i] - work.q[i] * alpha
         iterations += 1
         gain = wp.float64(0.5) * alpha * rz
         decrease += gain
@@ -73,6 +102,8 @@ def solve_serial(
         apply_inverse(factor, work.r, work.z)
         next_rz = wp.float64(0.0)
         for i in range(n):
+            if fixed[i] != 0:
+                work.z[i] = wp.vec3d()
             next_rz += wp.dot(work.r[i], work.z[i])
         beta = next_rz / rz
         rz = next_rz

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
 from muslin.sim.solve.block_matrix import BlockMatrix, add_diagonal
@@ -46,6 +47,7 @@ class LinearSystem:
         self.smallest_shift = shift
         self.shift = shift
 
+        self.fixed = wp.zeros(n, dtype=wp.int32, device=device)
         w = Workspace()
         for name in ("r", "z", "d", "q"):
             setattr(w, name, wp.zeros(n, dtype=wp.vec3d, device=device))
@@ -56,6 +58,10 @@ class LinearSystem:
     def clear(self) -> None:
         self.matrix.values.zero_()
         self.matrix.extra_count.zero_()
+
+    def fix(self, fixed: NDArray[np.bool_]) -> None:
+        """From now on the solution is told at these vertices (V,)."""
+        self.fixed.assign(fixed.astype(np.int32))
 
     def add_diagonal(self, weight: wp.array) -> None:
         wp.launch(add_diagonal, len(weight), [self.matrix, weight], device=self.device)
@@ -68,12 +74,30 @@ class LinearSystem:
         self._reserve_extras(2 * count)
         return False
 
-    def solve(self, gradient: wp.array, p: wp.array, tolerance: float, max_iterations: int) -> int:
-        """Fill p's first V entries; returns the number of iterations."""
+    def solve(
+        self, gradient: wp.array, told: wp.array, p: wp.array, tolerance: float, max_iterations: int
+    ) -> int:
+        """Fill p's first V entries, with those of `told` at fixed vertices; returns the number of iterations.
+
+        Rows of fixed vertices do not count: the others solve A p = -g with p given there.
+        """
         if self.parallel:
             scratch = (self.work, self.factor.inverse, self.scalars)
-            return solve_parallel(self.matrix, gradient, p, *scratch, tolerance, max_iterations)
-        args = [self.matrix, self.factor, gradient, p, self.work, self.shift, tolerance, max_iterations]
+            return solve_parallel(
+                self.matrix, self.fixed, gradient, told, p, *scratch, tolerance, max_iterations
+            )
+        args = [
+            self.matrix,
+            self.factor,
+            self.fixed,
+            gradient,
+            told,
+            p,
+            self.work,
+            self.shift,
+            tolerance,
+            max_iterations,
+        ]
         args.append(self.report)
         wp.launch(solve_serial, 1, args, device=self.device)
         iterations, used = self.report.numpy()[:2]

@@ -21,21 +21,37 @@ RZ, DQ, RZ_NEXT, GAIN, DECREASE = 0, 1, 2, 3, 4
 @wp.kernel
 def begin(
     matrix: BlockMatrix,
+    fixed: wp.array(dtype=wp.int32),
     gradient: wp.array(dtype=wp.vec3d),
-    p: wp.array(dtype=wp.vec3d),
     work: Workspace,
     inverse: wp.array(dtype=wp.mat33d),
     scalars: wp.array(dtype=wp.float64),
 ):
-    """p = 0, r = -g, d = M^-1 r, with M the block diagonal."""
+    """r = -g - q, d = M^-1 r, with M the block diagonal and M^-1 zero at fixed vertices; work.q holds A p."""
     i = wp.tid()
-    inverse[i] = wp.inverse(matrix.values[matrix.diagonal[i]])
-    r = -gradient[i]
+    inverse[i] = wp.mat33d()
+    if fixed[i] == 0:
+        inverse[i] = wp.inverse(matrix.values[matrix.diagonal[i]])
+    r = -gradient[i] - work.q[i]
     z = inverse[i] * r
     work.r[i] = r
     work.d[i] = z
-    p[i] = wp.vec3d()
     wp.atomic_add(scalars, RZ, wp.dot(r, z))
+
+
+@wp.kernel
+def tell(
+    fixed: wp.array(dtype=wp.int32),
+    told: wp.array(dtype=wp.vec3d),
+    p: wp.array(dtype=wp.vec3d),
+    work: Workspace,
+):
+    """d = p = what is told at fixed vertices, zero elsewhere."""
+    i = wp.tid()
+    p[i] = wp.vec3d()
+    if fixed[i] != 0:
+        p[i] = told[i]
+    work.d[i] = p[i]
 
 
 @wp.kernel
@@ -106,7 +122,9 @@ def account(scalars: wp.array(dtype=wp.float64)):
 
 def solve_parallel(
     matrix: BlockMatrix,
+    fixed: wp.array,
     gradient: wp.array,
+    told: wp.array,
     p: wp.array,
     work: Workspace,
     inverse: wp.array,
@@ -118,7 +136,10 @@ def solve_parallel(
     device = gradient.device
     n = len(gradient)
     scalars.zero_()
-    wp.launch(begin, n, [matrix, gradient, p, work, inverse, scalars], device=device)
+    wp.launch(tell, n, [fixed, told, p, work], device=device)
+    wp.launch(multiply, n, [matrix, work], device=device)
+    wp.launch(multiply_extras, len(matrix.extra_index), [matrix, work], device=device)
+    wp.launch(begin, n, [matrix, fixed, gradient, work, inverse, scalars], device=device)
     for iteration in range(1, max_iterations + 1):
         wp.launch(multiply, n, [matrix, work], device=device)
         wp.launch(multiply_extras, len(matrix.extra_index), [matrix, work], device=device)

@@ -5,9 +5,9 @@ A step minimises the incremental potential
     E(x) = sum m |x - t|^2 (1 + a dt) / (2 dt^2) - m g.x + W_stretch + W_bend + B_contact + D_friction
 
 by projected Newton: positive semi-definite Hessian, preconditioned conjugate gradients, every move limited by
-continuous collision detection and backtracked until E falls. Collider vertices move along with the
-iterations: what they still have to travel enters the Newton direction, so that the cloth is carried, and the
-part that a safe step allows is made.
+continuous collision detection and backtracked until E falls. Vertices that are told where to go, the
+collider's and the cloth's pins, move along with the iterations: what they still have to travel enters the
+Newton direction, so that the cloth is carried, and the part that a safe step allows is made.
 
 Sources: Li et al. 2020 (incremental potential contact); Gast, Schroeder 2014 (optimisation integrators).
 """
@@ -66,7 +66,8 @@ class StepReport:
 class ClothSimulator:
     """State of one cloth and one collider: positions, velocities, time stepping.
 
-    `positions` (V, 3) and `collider_vertices` (N, 3), metres, must not intersect.
+    `positions` (V, 3) and `collider_vertices` (N, 3), metres, must not intersect. `pins` (V,) marks vertices
+    that go where `advance` tells them.
     """
 
     def __init__(
@@ -126,15 +127,22 @@ class ClothSimulator:
     ) -> StepReport:
         """One time step of `dt` seconds while the collider moves straight to `collider_target` (N, 3).
 
+        Vertices marked in `pins` move straight to their rows of `pin_targets` (V, 3), or stay where they are.
         Without `inertia` the velocity starts from rest: a proximal step towards equilibrium. A step in which
-        the collider cannot arrive is retried as two half steps, up to `max_splits` deep; then
+        collider and pins cannot arrive is retried as two half steps, up to `max_splits` deep; then
         SimulationError.
         """
-        goal = self.collider_vertices if collider_target is None else collider_target
         saved_x, saved_v = self.x.numpy().copy(), self.velocity.copy()
+        goal = saved_x.copy()
+        if collider_target is not None:
+            goal[self.cloth.num_vertices :] = collider_target
+        if pin_targets is not None:
+            pinned = np.flatnonzero(self.pins)
+            goal[pinned] = pin_targets[pinned]
         report = StepReport()
+        self.linear.fix(self.pins)
         try:
-            self._advance(goal, dt, inertia, friction, pin_targets, report, self.settings.max_splits)
+            self._advance(goal, dt, inertia, friction, report, self.settings.max_splits)
         except SimulationError:
             self.restore(saved_x, saved_v)
             raise
@@ -146,13 +154,12 @@ class ClothSimulator:
         Elastic, contact and gravity forces, and friction as it stood at the start of the last step of `dt`
         seconds; no inertia.
         """
-        saved = self.weight.numpy().copy()
-        self.weight.zero_()
-        self.remaining.zero_()
-        self._assemble(1.0 / dt)
-        self.weight.assign(saved)
-        force = np.linalg.norm(self.gradient.numpy())
+        force = np.linalg.norm(self._forces_at_rest(dt)[~self.pins])
         return float(force / (self.cloth.mass.sum() * np.linalg.norm(self.settings.gravity) + 1e-300))
+
+    def pin_forces(self, dt: float) -> NDArray[np.float64]:
+        """Force (P, 3), N, with which each pinned vertex, in their order, holds the cloth at rest."""
+        return -self._forces_at_rest(dt)[self.pins]
 
     def set_gravity(self, gravity: tuple[float, float, float]) -> None:
         """Acceleration of gravity from now on, m/s^2."""
@@ -175,27 +182,27 @@ class ClothSimulator:
         dt: float,
         inertia: bool,
         friction: bool,
-        pin_targets: NDArray[np.float64] | None,
         report: StepReport,
         splits: int,
     ) -> None:
         saved_x, saved_v = self.x.numpy().copy(), self.velocity.copy()
-        if self._minimise(goal, dt, inertia, friction, pin_targets, report):
+        if self._minimise(goal, dt, inertia, friction, report):
             return
         if splits == 0:
-            way = np.linalg.norm(goal - saved_x[self.cloth.num_vertices :])
-            share = np.linalg.norm(goal - self.collider_vertices) / way
+            led = self._led()
+            left, way = (np.linalg.norm((goal - x)[led]) for x in (self.x.numpy(), saved_x))
+            share = left / way
             raise SimulationError(
-                f"the collider cannot move on without touching the cloth: {share:.0%} of the way is left "
+                f"collider and pins cannot go on without touching the cloth: {share:.0%} of the way is left "
                 f"after {self.settings.max_splits} halvings of the step; "
                 f"closest are {self.contact.tightest(self.x)}; "
                 "use a smaller time step, a looser garment or a slower motion"
             )
         self.restore(saved_x, saved_v)
         report.splits += 1
-        middle = 0.5 * (saved_x[self.cloth.num_vertices :] + goal)
-        self._advance(middle, 0.5 * dt, inertia, friction, pin_targets, report, splits - 1)
-        self._advance(goal, 0.5 * dt, inertia, friction, pin_targets, report, splits - 1)
+        middle = 0.5 * (saved_x + goal)
+        self._advance(middle, 0.5 * dt, inertia, friction, report, splits - 1)
+        self._advance(goal, 0.5 * dt, inertia, friction, report, splits - 1)
 
     def _minimise(
         self,
@@ -203,19 +210,18 @@ class ClothSimulator:
         dt: float,
         inertia: bool,
         friction: bool,
-        pin_targets: NDArray[np.float64] | None,
         report: StepReport,
     ) -> bool:
-        """The Newton iterations of one step; False if the collider does not arrive."""
+        """The Newton iterations of one step; False if collider and pins do not arrive at their `goal`."""
         s = self.settings
         n = self.cloth.num_vertices
         begin = self.x.numpy().copy()
         self.start.assign(begin)
         self.elastic.begin_step(self.x)
         self.contact.begin_step(self.x, dt, friction)
-        self._set_inertia(begin[:n], dt, inertia, pin_targets)
-        remaining = np.zeros_like(begin)
-        remaining[n:] = goal - begin[n:]
+        self._set_inertia(begin[:n], dt, inertia)
+        led = self._led()
+        remaining = np.where(led[:, None], goal - begin, 0.0)
         arrived = not np.abs(remaining).max(initial=0.0) > 0.0
         fraction = 1.0
         iterations = advances = relaxing = 0
@@ -225,7 +231,7 @@ class ClothSimulator:
             self._assemble(1.0 / dt)
             share = fraction if moving else 0.0
             for guard in range(s.guards + 1):
-                size, limit = self._direction(remaining[n:] * share, moving, report)
+                size, limit = self._direction(remaining[led] * share, led, moving, report)
                 safe = self.contact.largest_step(self.x, self.p, self._scalar)
                 if safe >= 0.5 or guard == s.guards:
                     break
@@ -258,18 +264,20 @@ class ClothSimulator:
         return True
 
     def _direction(
-        self, collider_move: NDArray[np.float64], moving: bool, report: StepReport
+        self, told: NDArray[np.float64], led: NDArray[np.bool_], moving: bool, report: StepReport
     ) -> tuple[float, float]:
-        """Solve for the next move p of cloth and collider and list the contacts on its way.
+        """Solve for the next move p, `told` where `led`, and list the contacts on its way.
 
         Returns the largest move of a cloth vertex before p was scaled, and the scale.
         """
         s = self.settings
         n = self.cloth.num_vertices
-        report.linear += self.linear.solve(self.gradient, self.p, s.linear_tolerance, s.max_linear_iterations)
+        report.linear += self.linear.solve(
+            self.gradient, self.remaining, self.p, s.linear_tolerance, s.max_linear_iterations
+        )
         report.newton += 1
         p = self.p.numpy()
-        p[n:] = collider_move
+        p[led] = told
         size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
         if not np.isfinite(size):
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
@@ -280,18 +288,25 @@ class ClothSimulator:
         self.contact.cover(self.x, self.p, limit * reach, limit * shared)
         return size, limit
 
-    def _set_inertia(
-        self, begin: NDArray[np.float64], dt: float, inertia: bool, pin_targets: NDArray[np.float64] | None
-    ) -> None:
+    def _led(self) -> NDArray[np.bool_]:
+        """Which vertices of the joint array are told where to go: pins and collider."""
+        return np.concatenate([self.pins, np.ones(len(self.x) - self.cloth.num_vertices, bool)])
+
+    def _set_inertia(self, begin: NDArray[np.float64], dt: float, inertia: bool) -> None:
         drag = 1.0 + self.settings.drag * dt
         weight = self.cloth.mass / dt**2 * drag
         target = begin + (dt / drag) * self.velocity if inertia else begin.copy()
-        if pin_targets is not None:
-            # Stiff enough to hold against any fabric, soft enough for double precision.
-            weight[self.pins] = 1.0e6
-            target[self.pins] = pin_targets[self.pins]
         self.weight.assign(weight)
         self.target.assign(target)
+
+    def _forces_at_rest(self, dt: float) -> NDArray[np.float64]:
+        """(V, 3) forces without inertia, N."""
+        saved = self.weight.numpy().copy()
+        self.weight.zero_()
+        self.remaining.zero_()
+        self._assemble(1.0 / dt)
+        self.weight.assign(saved)
+        return -self.gradient.numpy()
 
     def _assemble(self, inverse_dt: float) -> None:
         while True:

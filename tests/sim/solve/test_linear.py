@@ -73,7 +73,7 @@ def fill(linear: LinearSystem, cloth: ClothModel, seed: int, diagonal: float = 0
 def solve(linear: LinearSystem, g: Array, iterations: int, tolerance: float = 0.0) -> tuple[Array, Array]:
     """p (3 V,) of A p = -g and the report [iterations, shift, q(p), |r| / |g|]."""
     p = wp.zeros(len(g) // 3, dtype=wp.vec3d)
-    linear.solve(wp.array(g.reshape(-1, 3), dtype=wp.vec3d), p, tolerance, iterations)
+    linear.solve(wp.array(g.reshape(-1, 3), dtype=wp.vec3d), wp.zeros_like(p), p, tolerance, iterations)
     return p.numpy().ravel(), linear.report.numpy()
 
 
@@ -123,6 +123,23 @@ def test_too_short_a_list_of_blocks_grows(cloth: ClothModel) -> None:
     add(linear, pairs, blocks)
     assert linear.extras_fit()
     assert dense(linear)[3 * last, 3 * far] == count
+
+
+def test_fixed_vertices_get_what_they_are_told_and_the_others_solve_for_it(strip: ClothModel) -> None:
+    """p_f = A_ff^-1 (-g_f - A_fb p_b)"""
+    linear = LinearSystem(strip, "cpu")
+    fill(linear, strip, 4)
+    a = dense(linear)
+    generator = np.random.default_rng(GRADIENT_SEED)
+    g, told = generator.normal(size=len(a)), generator.normal(size=(len(a) // 3, 3))
+    fixed = generator.random(len(told)) < 0.3
+    p = wp.zeros(len(told), dtype=wp.vec3d)
+    linear.fix(fixed)
+    linear.solve(wp.array(g.reshape(-1, 3), dtype=wp.vec3d), wp.array(told, dtype=wp.vec3d), p, 0.0, 400)
+    b = np.repeat(fixed, 3)
+    free = np.linalg.solve(a[np.ix_(~b, ~b)], -g[~b] - a[np.ix_(~b, b)] @ told.ravel()[b])
+    np.testing.assert_array_equal(p.numpy()[fixed], told[fixed])
+    np.testing.assert_allclose(p.numpy()[~fixed].ravel(), free, atol=1e-9 * np.abs(free).max())
 
 
 def test_factor_is_exact_where_elimination_fills_nothing_in(strip: ClothModel) -> None:
