@@ -20,6 +20,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from muslin.sim.air import AirDrag, AirSettings
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.system import ContactSettings, ContactSystem
 from muslin.sim.elastic import ElasticEnergy
@@ -34,7 +35,7 @@ class SolverSettings:
     largest Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton
     once the collider has arrived, `max_advances` before, with `relaxations` in between where the way was
     short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration;
-    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`."""
+    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`; `air`, or None for a vacuum."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     damping: float = 2.0e-3
@@ -50,6 +51,7 @@ class SolverSettings:
     linear_tolerance: float = 0.1
     max_linear_iterations: int = 400
     max_splits: int = 4
+    air: AirSettings | None = None
 
 
 @dataclass
@@ -67,7 +69,8 @@ class ClothSimulator:
     """State of one cloth and one collider: positions, velocities, time stepping.
 
     `positions` (V, 3) and `collider_vertices` (N, 3), metres, must not intersect. `pins` (V,) marks vertices
-    that go where `advance` tells them.
+    that go where `advance` tells them. `work_left`: Newton iterations that may still be spent, for the caller
+    to set; the step that would need more ends with SimulationError.
     """
 
     def __init__(
@@ -85,6 +88,7 @@ class ClothSimulator:
         self.device = device
         n = cloth.num_vertices
         self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
+        self.air = None if self.settings.air is None else AirDrag(cloth, self.settings.air, device)
         self.contact = ContactSystem(
             cloth, collider_faces, len(collider_vertices), contact or ContactSettings(), device
         )
@@ -103,6 +107,7 @@ class ClothSimulator:
         self._scalar = wp.zeros(1, dtype=wp.float64, device=device)
         self.velocity = np.zeros((n, 3))
         self.pins = np.zeros(n, bool)
+        self.work_left = np.inf
         self._gravity = wp.vec3d(*self.settings.gravity)
         self.contact.search(self.x, self.p)
 
@@ -218,6 +223,8 @@ class ClothSimulator:
         begin = self.x.numpy().copy()
         self.start.assign(begin)
         self.elastic.begin_step(self.x)
+        if self.air is not None:
+            self.air.begin_step(self.x, self.velocity if inertia else np.zeros((n, 3)))
         self.contact.begin_step(self.x, dt, friction)
         self._set_inertia(begin[:n], dt, inertia)
         led = self._led()
@@ -272,6 +279,13 @@ class ClothSimulator:
         """
         s = self.settings
         n = self.cloth.num_vertices
+        if self.work_left <= 0:
+            raise SimulationError(
+                "the budget of Newton iterations is spent; closest are "
+                f"{self.contact.tightest(self.x)}; use a larger budget (solver.max_work), a smaller time "
+                "step or a slower motion"
+            )
+        self.work_left -= 1
         report.linear += self.linear.solve(
             self.gradient, self.remaining, self.p, s.linear_tolerance, s.max_linear_iterations
         )
@@ -316,6 +330,8 @@ class ClothSimulator:
             wp.launch(quadratic_gradient, self.cloth.num_vertices, args, device=self.device)
             self.linear.add_diagonal(self.weight)
             self.elastic.add_derivatives(self.x, inverse_dt, self.gradient, self.linear.matrix)
+            if self.air is not None:
+                self.air.add_derivatives(self.x, self.start, inverse_dt, self.gradient, self.linear.matrix)
             matrix = self.linear.matrix
             self.contact.add_derivatives(self.x, self.start, self.remaining, self.gradient, matrix)
             if self.linear.extras_fit():
@@ -326,6 +342,8 @@ class ClothSimulator:
         args = [x, self.target, self.weight, self.mass, self._gravity, self._scalar]
         wp.launch(quadratic_value, self.cloth.num_vertices, args, device=self.device)
         self.elastic.add_value(x, inverse_dt, self._scalar)
+        if self.air is not None:
+            self.air.add_value(x, self.start, inverse_dt, self._scalar)
         self.contact.add_value(x, self.start, self._scalar)
         return float(self._scalar.numpy()[0])
 
