@@ -290,7 +290,8 @@ class ClothSimulator:
             self.gradient, self.remaining, self.p, s.linear_tolerance, s.max_linear_iterations
         )
         report.newton += 1
-        p = self.p.numpy()
+        # A copy: on the CPU numpy() is a view, and what follows would measure p after it was scaled.
+        p = self.p.numpy().copy()
         p[led] = told
         size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
         if not np.isfinite(size):
