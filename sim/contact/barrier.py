@@ -123,9 +123,8 @@ def barrier_derivatives(
     measure: PairMeasure,
     gradient: wp.array(dtype=wp.vec3d),
     matrix: BlockMatrix,
-    active: wp.array(dtype=wp.int32),
 ):
-    """Adds gradient and Hessian blocks of cloth vertices; counts active pairs.
+    """Adds gradient and Hessian blocks of cloth vertices.
 
     `remaining` is the displacement that collider vertices still have to make: its linearised force is added
     to the gradient, so that the Newton direction moves the cloth along with the collider.
@@ -138,7 +137,6 @@ def barrier_derivatives(
     s = d / measure.range_
     if s >= wp.float64(1.0):
         return
-    wp.atomic_add(active, 0, 1)
     m = mollifier(is_edge_edge, pair, x, reference)
     scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
     b = barrier(s)

@@ -87,5 +87,10 @@ def pair_weights(is_edge_edge: bool, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x
 
 
 @wp.func
+def pair_distance(is_edge_edge: bool, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d) -> wp.float64:
+    return wp.length(pair_difference(pair_weights(is_edge_edge, x0, x1, x2, x3), x0, x1, x2, x3))
+
+
+@wp.func
 def pair_difference(w: wp.vec4d, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d) -> wp.vec3d:
     return x0 * w[0] + x1 * w[1] + x2 * w[2] + x3 * w[3]

@@ -23,7 +23,7 @@ from muslin.sim.contact.broad_phase import (
     sweep_vertices,
     vertex_face_candidates,
 )
-from muslin.sim.contact.ccd import largest_safe_step
+from muslin.sim.contact.ccd import cut_fractions, go_part_of_way, largest_safe_step
 from muslin.sim.contact.friction import FrictionModel, friction_derivatives, friction_value
 from muslin.sim.solve.block_matrix import BlockMatrix
 
@@ -48,7 +48,6 @@ class _Elements:
         self.device = device
         self.count = len(indices)
         self.indices = wp.array(indices, dtype=wp.int32, device=device, ndim=2)
-        self.on = wp.array(np.ones(self.count, np.int32), device=device)
         self.low = wp.zeros(self.count, dtype=wp.vec3, device=device)
         self.high = wp.zeros(self.count, dtype=wp.vec3, device=device)
         self.bvh: wp.Bvh | None = None
@@ -78,8 +77,7 @@ class _PairList:
 class ContactSystem:
     """Joint vertex array: V cloth vertices, then N collider vertices.
 
-    `collider_faces` (M, 3) index the collider's own vertices. Primitives of the collider that lie within it
-    can be switched off by `mask`.
+    `collider_faces` (M, 3) index the collider's own vertices.
     """
 
     def __init__(
@@ -102,14 +100,12 @@ class ContactSystem:
             if len(collider_faces)
             else np.zeros((0, 2), np.int32)
         )
-        self._body_edge_array = body_edges
         self.cloth_faces = _Elements(cloth.faces, device)
         self.cloth_edges = _Elements(cloth.edges, device)
         self.body_faces = _Elements(body_faces, device)
         self.body_edges = _Elements(body_edges, device)
         self.cloth_vertices = wp.array(np.arange(self.num_cloth, dtype=np.int32), device=device)
         self.body_vertices = wp.array(np.arange(self.num_cloth, n, dtype=np.int32), device=device)
-        self.vertex_on = wp.array(np.ones(n, np.int32), device=device)
         self.vertex_low = wp.zeros(n, dtype=wp.vec3d, device=device)
         self.vertex_high = wp.zeros(n, dtype=wp.vec3d, device=device)
 
@@ -123,56 +119,52 @@ class ContactSystem:
             _PairList(False, 8 * self.num_cloth, device),
             _PairList(True, 16 * self.num_cloth, device),
         ]
-        self.active = wp.zeros(1, dtype=wp.int32, device=device)
         self.nearest = wp.zeros(1, dtype=wp.float64, device=device)
         self._searches = 0
         self._travelled = 0.0
         self.friction = FrictionModel()
         self.num_friction = 0
+        self._still = wp.zeros(n, dtype=wp.vec3d, device=device)
+        self._fraction = wp.zeros(n, dtype=wp.float64, device=device)
+        self._next_fraction = wp.zeros(n, dtype=wp.float64, device=device)
+        self._cut = wp.zeros(1, dtype=wp.int32, device=device)
         self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
         self._reserve_friction(8 * self.num_cloth)
 
-    def mask(self, face_on: NDArray[np.bool_]) -> None:
-        """Switch collider faces on or off; edges and vertices follow the faces around them."""
-        self.body_faces.on.assign(face_on.astype(np.int32))
-        live = np.zeros(self.num_collider, bool)
-        live[self.collider_faces[face_on].ravel()] = True
-        on = np.ones(self.num_cloth + self.num_collider, np.int32)
-        on[self.num_cloth :] = live
-        self.vertex_on.assign(on)
-        edges = self._body_edge_array - self.num_cloth
-        keys = (
-            igl.edges(self.collider_faces[face_on].astype(np.int64))
-            if face_on.any()
-            else np.zeros((0, 2), int)
-        )
-        n = self.num_collider
-        alive = np.isin(
-            edges.min(1).astype(np.int64) * n + edges.max(1), keys.min(1).astype(np.int64) * n + keys.max(1)
-        )
-        self.body_edges.on.assign(alive.astype(np.int32))
-
     def cover(
-        self, x: wp.array, p: wp.array, reach: float, shared: NDArray[np.float64] | None = None
+        self,
+        x: wp.array,
+        p: wp.array,
+        reach: float,
+        shared: NDArray[np.float64] | None = None,
+        base: wp.array | None = None,
     ) -> None:
         """Make sure that every pair that may come within range on the way from x to x + p is listed.
 
         `reach` is the largest move |p_i - shared|, metres, `shared` (3,) a motion that all vertices have in
         common. A search looks `margin` further than it must; while the moves since then add up to no more
-        than half of that, its list still holds.
+        than half of that, its list still holds. With `base` vertices may stop anywhere between their base_i
+        and p_i.
         """
         if 2.0 * (self._travelled + reach) <= self.settings.margin:
             self._travelled += reach
         else:
-            self.search(x, p, shared)
+            self.search(x, p, shared, base)
 
-    def search(self, x: wp.array, p: wp.array, shared: NDArray[np.float64] | None = None) -> None:
+    def search(
+        self,
+        x: wp.array,
+        p: wp.array,
+        shared: NDArray[np.float64] | None = None,
+        base: wp.array | None = None,
+    ) -> None:
         """List every pair that may come within range and `margin` on the way from x to x + p."""
         shift = wp.vec3d() if shared is None else wp.vec3d(*shared)
+        ways = [x, self._still if base is None else base, p]
         self._travelled = 0.0
         n = self.num_cloth + self.num_collider
         bounds = [self.vertex_low, self.vertex_high]
-        wp.launch(sweep_vertices, n, [x, p, shift, *bounds], device=self.device)
+        wp.launch(sweep_vertices, n, [*ways, shift, *bounds], device=self.device)
         rebuild = self._searches % 50 == 0
         self._searches += 1
         for elements in (self.cloth_faces, self.cloth_edges, self.body_faces, self.body_edges):
@@ -182,14 +174,14 @@ class ContactSystem:
         high = self.vertex_high.numpy()[: self.num_cloth].max(axis=0) + radius
         for pairs in self.lists:
             for _ in range(2):
-                self._launch_search(pairs, wp.vec3d(*low), wp.vec3d(*high))
+                self._launch_search(pairs, ways, wp.vec3d(*low), wp.vec3d(*high))
                 found = int(pairs.count.numpy()[0])
                 pairs.length = found
                 if found <= len(pairs.pairs):
                     break
                 pairs.pairs = wp.zeros(found + found // 2, dtype=wp.vec4i, device=self.device)
 
-    def _launch_search(self, out: _PairList, low: wp.vec3d, high: wp.vec3d) -> None:
+    def _launch_search(self, out: _PairList, ways: list[wp.array], low: wp.vec3d, high: wp.vec3d) -> None:
         out.count.zero_()
         radius = self.settings.range + self.settings.margin
         bounds = [self.vertex_low, self.vertex_high]
@@ -198,7 +190,7 @@ class ContactSystem:
             queries = self.cloth_edges
             for target in (self.cloth_edges, self.body_edges) if has_body else (self.cloth_edges,):
                 assert target.bvh is not None
-                args = [target.bvh.id, queries.indices, target.indices, target.on, int(target is queries)]
+                args = [target.bvh.id, queries.indices, target.indices, int(target is queries), *ways]
                 args += [*bounds, radius, out.count, out.pairs]
                 wp.launch(edge_edge_candidates, queries.count, args, device=self.device)
             return
@@ -207,7 +199,7 @@ class ContactSystem:
             searches += [(self.cloth_vertices, self.body_faces), (self.body_vertices, self.cloth_faces)]
         for vertices, target in searches:
             assert target.bvh is not None
-            args = [target.bvh.id, vertices, target.indices, self.vertex_on, target.on, *bounds, low, high]
+            args = [target.bvh.id, vertices, target.indices, *ways, *bounds, low, high]
             args += [radius, out.count, out.pairs]
             wp.launch(vertex_face_candidates, len(vertices), args, device=self.device)
 
@@ -219,6 +211,32 @@ class ContactSystem:
                 args = [x, p, pairs.pairs, pairs.is_edge_edge, step]
                 wp.launch(largest_safe_step, pairs.length, args, device=self.device)
         return float(step.numpy()[0])
+
+    def cut_to_safety(
+        self, x: wp.array, p: wp.array, step: wp.array, base: wp.array | None = None, passes: int = 4
+    ) -> float:
+        """Shorten p, vertex by vertex, towards `base` (or rest) until no listed pair touches on x + p.
+
+        What `passes` leave undone is up to the returned t in (0, 1]: x + t p is safe. `step` is scratch (1,).
+        """
+        base = self._still if base is None else base
+        self._fraction.fill_(1.0)
+        for _ in range(passes):
+            self._cut.zero_()
+            wp.copy(self._next_fraction, self._fraction)
+            for pairs in self.lists:
+                if pairs.length:
+                    args = [x, base, p, pairs.pairs, pairs.is_edge_edge, self._fraction]
+                    args += [self._next_fraction, self._cut]
+                    wp.launch(cut_fractions, pairs.length, args, device=self.device)
+            if int(self._cut.numpy()[0]) == 0:
+                break
+            self._fraction, self._next_fraction = self._next_fraction, self._fraction
+        else:
+            wp.launch(go_part_of_way, len(x), [base, p, self._fraction], device=self.device)
+            return self.largest_step(x, p, step)
+        wp.launch(go_part_of_way, len(x), [base, p, self._fraction], device=self.device)
+        return 1.0
 
     def add_value(self, x: wp.array, start: wp.array, energy: wp.array) -> None:
         for pairs in self.lists:
@@ -232,11 +250,10 @@ class ContactSystem:
     def add_derivatives(
         self, x: wp.array, start: wp.array, remaining: wp.array, gradient: wp.array, matrix: BlockMatrix
     ) -> None:
-        self.active.zero_()
         for pairs in self.lists:
             if pairs.length:
                 args = [x, start, remaining, pairs.pairs, pairs.is_edge_edge, self.measure]
-                args += [gradient, matrix, self.active]
+                args += [gradient, matrix]
                 wp.launch(barrier_derivatives, pairs.length, args, device=self.device)
         if self.num_friction:
             args = [x, start, remaining, self.friction, gradient, matrix]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from muslin.sim.air import AirDrag, AirSettings
 from muslin.sim.cloth import ClothModel
+from muslin.sim.contact.carry import Carry
 from muslin.sim.contact.system import ContactSettings, ContactSystem
 from muslin.sim.elastic import ElasticEnergy
 from muslin.sim.solve.errors import SimulationError
@@ -100,10 +101,13 @@ class ClothSimulator:
         self.trial = wp.zeros(total, **vec)
         self.p = wp.zeros(total, **vec)
         self.remaining = wp.zeros(total, **vec)
+        self.base = wp.zeros(total, **vec)
+        self.uncut = wp.zeros(total, **vec)
         self.target = wp.zeros(n, **vec)
         self.gradient = wp.zeros(n, **vec)
         self.weight = wp.zeros(n, dtype=wp.float64, device=device)
         self.mass = wp.array(cloth.mass, dtype=wp.float64, device=device)
+        self.carry = Carry(collider_vertices, collider_faces, device) if len(collider_faces) else None
         self._scalar = wp.zeros(1, dtype=wp.float64, device=device)
         self.velocity = np.zeros((n, 3))
         self.pins = np.zeros(n, bool)
@@ -231,6 +235,9 @@ class ClothSimulator:
         remaining = np.where(led[:, None], goal - begin, 0.0)
         arrived = not np.abs(remaining).max(initial=0.0) > 0.0
         fraction = 1.0
+        if not arrived and self.carry is not None and not np.abs(remaining[:n]).max() > 0.0:
+            fraction = self._go_along(remaining, dt)
+            arrived = fraction == 0.0
         iterations = advances = relaxing = 0
         while True:
             moving = not arrived and relaxing == 0
@@ -239,6 +246,10 @@ class ClothSimulator:
             share = fraction if moving else 0.0
             for guard in range(s.guards + 1):
                 size, limit = self._direction(remaining[led] * share, led, moving, report)
+                if not moving:
+                    wp.copy(self.uncut, self.p)
+                    safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
+                    break
                 safe = self.contact.largest_step(self.x, self.p, self._scalar)
                 if safe >= 0.5 or guard == s.guards:
                     break
@@ -257,6 +268,11 @@ class ClothSimulator:
                 relaxing = s.relaxations if safe < 0.5 else 0
             else:
                 step = self._line_search(safe, 1.0 / dt)
+                if step == 0.0:
+                    # Shortened here and there, the direction may not go downhill; as a whole it does.
+                    wp.copy(self.p, self.uncut)
+                    safe = self.contact.largest_step(self.x, self.p, self._scalar)
+                    step = self._line_search(safe, 1.0 / dt)
                 relaxing -= 1
                 if not arrived:
                     continue
@@ -269,6 +285,23 @@ class ClothSimulator:
                     break
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
         return True
+
+    def _go_along(self, remaining: NDArray[np.float64], dt: float) -> float:
+        """Move the collider, and the cloth along with it; returns the share of the way that is left."""
+        assert self.carry is not None
+        n = self.cloth.num_vertices
+        self.remaining.assign(remaining)
+        free = wp.array(
+            self.target.numpy() + dt**2 * np.array(self._gravity), dtype=wp.vec3d, device=self.device
+        )
+        self.carry.moves(self.x, self.remaining, free, self.base, self.p)
+        moves = np.stack([self.p.numpy(), self.base.numpy()])
+        shared = moves[0, :n].mean(axis=0)
+        reach = float(np.sqrt(((moves - shared) ** 2).sum(axis=2).max()))
+        self.contact.cover(self.x, self.p, reach, shared, self.base)
+        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base)
+        self._move(safe)
+        return 1.0 - safe
 
     def _direction(
         self, told: NDArray[np.float64], led: NDArray[np.bool_], moving: bool, report: StepReport

@@ -77,7 +77,7 @@ def test_far_pairs_are_left_out(make_soup, closest, is_edge_edge):
 
 def test_a_list_longer_than_its_room_grows(make_soup):
     soup = make_soup(60, 0)
-    points = random_soup(60, seed=5, box=0.002)
+    points = random_soup(60, seed=5, size=0.002, box=0.0005)
     room = [len(pairs.pairs) for pairs in soup.contact.lists]
     soup.search(points)
     for pairs, before in zip(soup.contact.lists, room, strict=True):
@@ -104,22 +104,26 @@ def test_a_covered_move_needs_no_search_and_misses_nothing(make_soup, closest, i
     assert soup.contact._searches == searches + 1
 
 
-def test_faces_switched_off_give_no_pairs(make_soup):
-    soup = make_soup(10, 10)
-    points = random_soup(20, seed=3)
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_at_rest_exactly_the_near_pairs_are_listed(make_soup, closest, is_edge_edge):
+    soup = make_soup(20, 20)
+    points = random_soup(40, seed=3)
     soup.search(points)
-    before = [set(keys(soup.pairs(kind), kind)) for kind in (False, True)]
-    on = np.arange(10) % 2 == 0
-    soup.contact.mask(on)
-    soup.search(points)
-    off = set((soup.num_cloth + np.arange(30).reshape(-1, 3)[~on]).ravel().tolist())
-    for kind in (False, True):
-        kept = {key for key in before[kind] if off.isdisjoint(np.hstack(key).tolist())}
-        assert set(keys(soup.pairs(kind), kind)) == kept
-        assert kept < before[kind]
-    soup.contact.mask(np.ones(10, bool))
-    soup.search(points)
-    assert [set(keys(soup.pairs(kind), kind)) for kind in (False, True)] == before
+    wanted = near(closest, soup, [points], is_edge_edge, RANGE + MARGIN)
+    assert set(keys(soup.pairs(is_edge_edge), is_edge_edge)) == wanted
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_ways_that_may_end_anywhere_between_two_moves_are_covered(make_soup, closest, is_edge_edge):
+    soup = make_soup(15, 15)
+    points = random_soup(30, seed=6, box=0.02)
+    draw = np.random.default_rng(8)
+    base, move = 0.01 * draw.normal(size=(2, *points.shape)) + np.array([0.3, 0.0, 0.1])
+    soup.contact.search(soup.array(points), soup.array(move), None, soup.array(base))
+    shares = [0.0, 1.0, 0.5] + [draw.uniform(size=(len(points), 1)) for _ in range(5)]
+    path = [points + t * (base + f * (move - base)) for f in shares for t in (0.5, 1.0)]
+    wanted = near(closest, soup, path, is_edge_edge, RANGE)
+    assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
 
 
 def test_neighbours_are_no_pairs(grid_mesh):

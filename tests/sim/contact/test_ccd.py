@@ -129,3 +129,45 @@ def test_whole_meshes_step_without_collision(grid_mesh, seed):
     moved = points + step * move
     counts = count_intersections(moved[: len(flat)], mesh.faces, moved[len(flat) :], faces)
     assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)
+
+
+def test_moves_cut_vertex_by_vertex_are_safe_and_leave_far_vertices_alone(make_soup, closest):
+    """Triangles stacked 1 mm apart fall on the lowest, which is still; one far away falls freely."""
+    count = 6
+    heights = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 500.0]) * 1e-3
+    triangle = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.0, 0.02]])
+    points = (triangle + np.insert(np.zeros((count, 1, 2)), 1, heights[:, None], axis=2)).reshape(-1, 3)
+    moves = np.zeros_like(points)
+    moves[3:, 1] = -0.01
+    soup = make_soup(count, 0)
+    soup.search(points, moves)
+    x, p, step = soup.array(points), soup.array(moves), wp.zeros(1, dtype=wp.float64, device="cpu")
+    share = soup.contact.cut_to_safety(x, p, step)
+    cut = p.numpy()
+    assert 0.5 < share <= 1.0
+    np.testing.assert_array_equal(cut[-3:], moves[-3:])
+    assert (np.abs(cut[3:-3, 1]) > 1e-5).all()
+    assert (np.abs(cut[3:-3, 1]) < 4e-3).all()
+    nothing = np.zeros((0, 3)), np.zeros((0, 3), int)
+    for t in np.linspace(0.0, share, 11):
+        found = count_intersections(points + t * cut, np.arange(3 * count).reshape(-1, 3), *nothing)
+        assert found.cloth_cloth == 0
+    layers = (points + share * cut)[:, 1].reshape(count, 3)
+    assert (np.diff(layers, axis=0) > 0.0).all()
+
+
+def test_what_is_cut_falls_back_on_the_base(make_soup):
+    """Two sheets carried along by 5 cm, one of them flying into the other: both keep the motion they share."""
+    triangle = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.0, 0.02]])
+    points = np.concatenate([triangle, triangle + [0.0, 1e-3, 0.0]])
+    base = np.tile([0.05, 0.0, 0.0], (6, 1))
+    moves = base.copy()
+    moves[3:, 1] = -0.01
+    soup = make_soup(2, 0)
+    x, p, b = soup.array(points), soup.array(moves), soup.array(base)
+    soup.contact.search(x, p, None, b)
+    share = soup.contact.cut_to_safety(x, p, wp.zeros(1, dtype=wp.float64, device="cpu"), b)
+    assert share == 1.0
+    np.testing.assert_array_equal(p.numpy()[:, [0, 2]], base[:, [0, 2]])
+    assert (-1e-3 < p.numpy()[3:, 1]).all()
+    assert (p.numpy()[3:, 1] < -1e-4).all()
