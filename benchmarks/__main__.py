@@ -1,0 +1,149 @@
+"""`python -m benchmarks COMMAND`, from the root of the repository; see benchmarks/README.md."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+OUT = Path("out/benchmarks")
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+Setting = Annotated[Path, typer.Option("--setting", help="File of the setting.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder for logs, frames and reports.")]
+Core = Annotated[int, typer.Option("--core", help="The processor core to run on.")]
+Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Alternating repetitions.")]
+
+
+@app.command("setting")
+def make(
+    setting: Setting = OUT / "setting.npz",
+    frames: Annotated[int, typer.Option(min=1, help="Frames of 1/60 s.")] = 120,
+    edge_length: Annotated[float | None, typer.Option(help="Of the cloth, metres.")] = None,
+) -> None:
+    """Make what all contenders are given: dress, pose, settle, and walk the body."""
+    from benchmarks.make_setting import make_setting
+
+    made = make_setting(frames, edge_length)
+    made.save(setting)
+    typer.echo(
+        f"{setting}: {len(made.positions)} cloth and {made.body.shape[1]} body vertices, {frames} frames"
+    )
+
+
+@app.command()
+def compare(
+    setting: Setting = OUT / "setting.npz",
+    out: Out = OUT,
+    peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",
+    frames: Annotated[int | None, typer.Option(min=1, help="Only the first so many.")] = 60,
+    rounds: Rounds = 3,
+    core: Core = 0,
+    only: Annotated[
+        str, typer.Option(help="Contenders to run beside muslin.")
+    ] = "blender,newton_style3d,newton_vbd",
+) -> None:
+    """Run muslin and every peer side by side; write compare.md and compare.json."""
+    from benchmarks import compare as side_by_side
+    from benchmarks.contenders.catalogue import named
+
+    chosen = named(only)
+    absent = {c.name: why for c in chosen if (why := c.missing(peers)) is not None}
+    for name, why in absent.items():
+        typer.echo(f"left out: {name}: {why}", err=True)
+    present = [c for c in chosen if c.name not in absent]
+    results = side_by_side.compare(setting, present, peers, out, frames, rounds, core, typer.echo)
+    left_out = "".join(f"- **{name}** was left out: {why}\n" for name, why in absent.items())
+    table = side_by_side.table(results) + left_out
+    (out / "compare.md").write_text(f"{machine()}\n\n{table}", encoding="utf-8")
+    _write(out / "compare.json", {"results": side_by_side.as_json(results), "left_out": absent})
+    typer.echo(table)
+
+
+@app.command()
+def drape(
+    out: Out = OUT,
+    neighbours: Annotated[int, typer.Option(min=0, help="Drapes that start from the one before.")] = 4,
+    step: Annotated[float, typer.Option(help="Change of beta_1 from one to the next.")] = 0.03,
+    edge_length: Annotated[float | None, typer.Option(help="Of the cloth, metres.")] = None,
+    core: Core = 0,
+) -> None:
+    """CPU seconds of a drape from the sewn start, and of neighbours warm-started from it."""
+    from benchmarks.drapes import drape_costs
+    from benchmarks.isolated import held_to
+
+    with held_to({core}):
+        costs = drape_costs(neighbours, step, edge_length)
+    for cost in costs:
+        residual = "unknown" if cost.residual is None else f"{cost.residual:.1e}"
+        typer.echo(
+            f"beta {cost.beta:.2f}: {cost.cpu_seconds:.2f} CPU s, {cost.steps} steps, "
+            f"at rest {cost.at_rest}, residual {residual}, {cost.intersections} intersections"
+        )
+    _write(out / "drape.json", [asdict(cost) for cost in costs])
+
+
+@app.command()
+def growth(
+    sizes: Annotated[str, typer.Option(help="Cloth vertices, about.")] = "1000,2000,4000,8000,16000",
+    frames: Annotated[int, typer.Option(min=1, help="Frames of 1/60 s.")] = 30,
+    out: Out = OUT / "growth",
+    core: Core = 0,
+) -> None:
+    """Cost against the number of vertices, and the exponent of the power law through it."""
+    from benchmarks.growth import measure_growth
+
+    found = measure_growth([int(size) for size in sizes.split(",")], frames, out, core, typer.echo)
+    typer.echo(f"exponent {found.exponent:.2f}")
+    _write(out / "growth.json", asdict(found))
+
+
+@app.command()
+def workers(
+    samples: Annotated[int, typer.Option(min=2, help="Drapes to make, each from the sewn start.")] = 4,
+    edge_length: Annotated[float, typer.Option(help="Of the cloth, metres.")] = 0.0142,
+    rounds: Rounds = 2,
+    out: Out = OUT / "workers",
+    cores: Annotated[tuple[int, int], typer.Option(help="Two processor cores.")] = (0, 1),
+) -> None:
+    """Samples an hour of `muslin generate` with one worker and with two."""
+    from benchmarks.workers import measure_workers
+
+    found = measure_workers(samples, edge_length, rounds, out, cores, typer.echo)
+    typer.echo(f"two over one: {found.gain.text()}")
+    _write(out / "workers.json", asdict(found))
+
+
+@app.command()
+def memory(
+    seconds: Annotated[float, typer.Option(help="Of the walk.")] = 0.5, out: Out = OUT, core: Core = 0
+) -> None:
+    """Peak memory of making one certified sequence."""
+    from benchmarks.workers import peak_memory
+
+    peak = peak_memory(seconds, out, core)
+    typer.echo(f"{peak / 1e9:.2f} GB")
+    _write(out / "memory.json", {"peak_bytes": peak})
+
+
+def machine() -> str:
+    """The processor, system and Python that figures were taken on."""
+    described = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    model = next(
+        (line.split(":")[1].strip() for line in described if line.startswith("model name")), "unknown"
+    )
+    return f"{model}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+
+
+def _write(path: Path, values: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"machine": machine(), "values": values}, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,35 @@
+"""The setting's cloth as muslin's own types."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.setting import Setting
+from muslin.garments.mesh import GarmentMesh
+from muslin.sim.cloth import ClothModel, build_cloth
+from muslin.sim.material import load_fabric
+from muslin.sim.scene import load_scene
+
+SCENE = "scenes/tshirt_walk.toml"
+
+
+def garment(setting: Setting) -> GarmentMesh:
+    """Its mesh; panels' names and uv layout play no part in simulation."""
+    panel_to_vertex = np.empty(len(setting.panel_vertices), np.int32)
+    panel_to_vertex[setting.panel_faces] = setting.faces
+    return GarmentMesh(
+        faces=setting.faces,
+        panel_faces=setting.panel_faces,
+        panel_vertices=setting.panel_vertices,
+        panel_to_vertex=panel_to_vertex,
+        face_panel=np.zeros(len(setting.faces), np.int32),
+        panel_names=("cloth",),
+        uv=np.zeros_like(setting.panel_vertices),
+        name="setting",
+        parameters={},
+    )
+
+
+def cloth_model(setting: Setting) -> ClothModel:
+    """Its rest geometry in the fabric of the scene."""
+    return build_cloth(garment(setting), load_fabric(load_scene(SCENE).fabric))
