@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.material import BEND_CURVATURE_STEP, Fabric
+from muslin.sim.curvature import curvature_operator
+from muslin.sim.material import Fabric
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +21,8 @@ class ClothModel:
     `faces` (F, 3), `edges` (E, 2), `hinges` (H, 4): edge vertices, then the two opposite ones.
     `inverse_rest` (F, 2, 2): inverse of the rest edge matrix in (warp, weft) coordinates, 1/m.
     `rest_area` (F,) m^2; `mass` (V,) kg; `vertex_area` (V,) and `edge_area` (E,) m^2.
-    `hinge_length` (H,) m, `hinge_area` (H,) m^2 of both faces, `hinge_stiffness` (H, 5) N m at the table's
-    curvatures.
+    The curvature (K11, K22, K12) of face f is the sum of `curvature_weights` (N, 3), 1/m, times the angles of
+    `curvature_hinges` (N,), both from curvature_offsets[f] to curvature_offsets[f + 1].
     """
 
     faces: NDArray[np.int32]
@@ -32,9 +33,9 @@ class ClothModel:
     mass: NDArray[np.float64]
     vertex_area: NDArray[np.float64]
     edge_area: NDArray[np.float64]
-    hinge_length: NDArray[np.float64]
-    hinge_area: NDArray[np.float64]
-    hinge_stiffness: NDArray[np.float64]
+    curvature_offsets: NDArray[np.int32]
+    curvature_hinges: NDArray[np.int32]
+    curvature_weights: NDArray[np.float64]
     fabric: Fabric
 
     @property
@@ -76,17 +77,7 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
     edges, _, edge_of_corner = _edges(faces)
     edge_area = np.bincount(edge_of_corner, np.tile(area / 3.0, 3), len(edges)).astype(np.float64)
     hinges, hinge_faces, hinge_corner = _hinges(faces, edges, edge_of_corner)
-    stiffness = np.zeros((len(hinges), 5))
-    length = np.zeros(len(hinges))
-    for side in range(2):
-        # A hinge on a seam has a direction in each of its panels; both count half.
-        face, corner = hinge_faces[:, side], hinge_corner[:, side]
-        a = corners[face, (corner + 1) % 3]
-        b = corners[face, (corner + 2) % 3]
-        direction = b - a
-        length += 0.5 * np.linalg.norm(direction, axis=1)
-        angle = np.degrees(np.arctan2(np.abs(direction[:, 1]), np.abs(direction[:, 0])))
-        stiffness += 0.5 * _interpolate_rows(fabric.bend, angle / 45.0)
+    offsets, members, weights = _curvature(corners, hinge_faces, hinge_corner)
     return ClothModel(
         faces=faces,
         edges=edges,
@@ -96,28 +87,29 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
         mass=fabric.density * vertex_area,
         vertex_area=vertex_area,
         edge_area=edge_area,
-        hinge_length=length,
-        hinge_area=area[hinge_faces].sum(axis=1),
-        hinge_stiffness=stiffness,
+        curvature_offsets=offsets,
+        curvature_hinges=members,
+        curvature_weights=weights,
         fabric=fabric,
     )
 
 
-def bend_moments(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Integrals J_i of k(a) a from 0 to the i-th curvature of the table, for (H, 5) coefficients: (H, 5)."""
-    h = BEND_CURVATURE_STEP
-    k0, k1 = stiffness[:, :-1], stiffness[:, 1:]
-    a0 = h * np.arange(4)
-    slope = (k1 - k0) / h
-    # k(a) a over one interval, with a = a0 + s: (k0 + slope s)(a0 + s)
-    piece = k0 * (a0 * h + h**2 / 2.0) + slope * (a0 * h**2 / 2.0 + h**3 / 3.0)
-    return np.concatenate([np.zeros((len(stiffness), 1)), np.cumsum(piece, axis=1)], axis=1)
-
-
-def _interpolate_rows(table: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
-    lower = np.clip(position.astype(int), 0, len(table) - 2)
-    weight = (position - lower)[:, None]
-    return (1.0 - weight) * table[lower] + weight * table[lower + 1]
+def _curvature(
+    corners: NDArray[np.float64], hinge_faces: NDArray[np.int64], hinge_corner: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    """Offsets, hinges and weights of curvature as in `ClothModel`, less those that are rounding errors."""
+    num_faces, num_hinges = len(corners), len(hinge_faces)
+    hinge_of_corner = np.full((num_faces, 3), -1)
+    hinge_of_corner[hinge_faces, hinge_corner] = np.arange(num_hinges)[:, None]
+    operator = curvature_operator(corners, hinge_of_corner, hinge_faces, hinge_corner).tocoo()
+    keep = np.abs(operator.data) > 1e-9 * np.abs(operator.data).max(initial=0.0)
+    rows, columns = (index[keep].astype(np.int64) for index in operator.coords)
+    keys, position = np.unique(rows // 3 * max(num_hinges, 1) + columns, return_inverse=True)
+    weights = np.zeros((len(keys), 3))
+    weights[position, rows % 3] = operator.data[keep]
+    face, member = np.divmod(keys, max(num_hinges, 1))
+    offsets = np.searchsorted(face, np.arange(num_faces + 1))
+    return offsets.astype(np.int32), member.astype(np.int32), weights
 
 
 def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int64]]:

@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from muslin.sim.cloth import ClothModel, bend_moments
-from muslin.sim.energies.bending import BendModel, bend_angle, bend_derivatives, bend_value
+from muslin.sim.cloth import ClothModel
+from muslin.sim.energies.bending import (
+    BendModel,
+    BendState,
+    bend_angle,
+    bend_curvature,
+    bend_derivatives,
+    bend_torque,
+    bend_value,
+    curvaturev,
+)
 from muslin.sim.energies.stretch import (
     StretchModel,
     strainv,
@@ -14,6 +23,7 @@ from muslin.sim.energies.stretch import (
     stretch_strain,
     stretch_value,
 )
+from muslin.sim.material import BEND_CURVATURE_STEP, bend_moments
 from muslin.sim.solve.block_matrix import BlockMatrix
 
 
@@ -37,29 +47,41 @@ class ElasticEnergy:
         stretch.slots = wp.array(cloth.slots(cloth.faces), dtype=wp.int32, device=device)
         self.stretch = stretch
 
+        rigidity = cloth.fabric.rigidity
         bend = BendModel()
         bend.hinges = wp.array(cloth.hinges, dtype=wp.vec4i, device=device)
-        bend.length = wp.array(cloth.hinge_length, **f64)
-        bend.area = wp.array(cloth.hinge_area, **f64)
-        bend.stiffness = wp.array(cloth.hinge_stiffness, **f64)
-        bend.moment = wp.array(bend_moments(cloth.hinge_stiffness), **f64)
+        bend.rest_area = stretch.rest_area
+        bend.offsets = wp.array(cloth.curvature_offsets, dtype=wp.int32, device=device)
+        bend.member = wp.array(cloth.curvature_hinges, dtype=wp.int32, device=device)
+        bend.weight = wp.array(cloth.curvature_weights, dtype=curvaturev, device=device)
+        bend.rigidity = wp.array(rigidity, dtype=wp.vec4d, device=device)
+        bend.moment = wp.array(bend_moments(rigidity), dtype=wp.vec4d, device=device)
+        # A cylinder of curvature k folds the table's hinges by half of it.
+        bend.spacing = 2.0 * BEND_CURVATURE_STEP
         bend.slots = wp.array(cloth.slots(cloth.hinges), dtype=wp.int32, device=device)
         self.bend = bend
+        state = BendState()
+        for name in ("angle", "torque", "stiffness"):
+            setattr(state, name, wp.zeros(self.num_hinges, **f64))
+        self.bend_state = state
 
         self._strain = wp.zeros(self.num_faces, dtype=strainv, device=device)
-        self._angle = wp.zeros(self.num_hinges, **f64)
+        self._curvature = wp.zeros(self.num_faces, dtype=curvaturev, device=device)
 
     def begin_step(self, x: wp.array) -> None:
-        """Remember strain and angles at `x`, which damping is relative to."""
+        """Remember strain and curvature at `x`, which damping is relative to."""
         wp.launch(stretch_strain, self.num_faces, [x, self.stretch, self._strain], device=self.device)
-        wp.launch(bend_angle, self.num_hinges, [x, self.bend, self._angle], device=self.device)
+        self._fold(x)
+        bend = [self.bend, self.bend_state, self._curvature]
+        wp.launch(bend_curvature, self.num_faces, bend, device=self.device)
 
     def add_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
         rate = self.damping * inverse_dt
         stretch = [x, self.stretch, self._strain, rate, energy]
         wp.launch(stretch_value, self.num_faces, stretch, device=self.device)
-        bend = [x, self.bend, self._angle, rate, energy]
-        wp.launch(bend_value, self.num_hinges, bend, device=self.device)
+        self._fold(x)
+        bend = [self.bend, self.bend_state, self._curvature, rate]
+        wp.launch(bend_value, self.num_faces, [*bend, energy], device=self.device)
 
     def add_derivatives(
         self, x: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix
@@ -67,8 +89,14 @@ class ElasticEnergy:
         rate = self.damping * inverse_dt
         stretch = [x, self.stretch, self._strain, rate, gradient, matrix.values]
         wp.launch(stretch_derivatives, self.num_faces, stretch, device=self.device)
-        bend = [x, self.bend, self._angle, rate, gradient, matrix.values]
-        wp.launch(bend_derivatives, self.num_hinges, bend, device=self.device)
+        self._fold(x)
+        bend = [self.bend, self.bend_state, self._curvature, rate]
+        wp.launch(bend_torque, self.num_faces, bend, device=self.device)
+        hinges = [x, self.bend, self.bend_state, gradient, matrix.values]
+        wp.launch(bend_derivatives, self.num_hinges, hinges, device=self.device)
+
+    def _fold(self, x: wp.array) -> None:
+        wp.launch(bend_angle, self.num_hinges, [x, self.bend, self.bend_state], device=self.device)
 
 
 def principal_stretches(cloth: ClothModel, positions: np.ndarray) -> np.ndarray:

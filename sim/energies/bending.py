@@ -1,37 +1,64 @@
-"""Bending energy of hinges with curvature-dependent stiffness, as Warp kernels.
+"""Bending energy of the curvature of triangles, with curvature-dependent rigidity, as Warp kernels.
 
-For a hinge of rest length l between faces of rest area a0 + a1 = A, with dihedral angle theta (0 when flat)
-and curvature alpha = |theta| l / (2 A),
+With K = (K11, K22, K12) the curvature of a triangle in warp/weft coordinates, a linear function of hinge
+angles (`muslin.sim.curvature`), k = |K| = sqrt(K11^2 + K22^2 + 2 K12^2), and q_c the form
 
-    E(theta) = A J(alpha),   J(alpha) = int_0^alpha k(a) a da,
+    q_c(K) = c11 K11^2 + 2 c12 K11 K22 + c22 K22^2 + 4 c66 K12^2,
 
-k piecewise linear between the measured curvatures 0, 5, 10, 15, 20 1/m and constant beyond. Its torque is the
-table's, dE/dtheta = (l / 2) k(alpha) alpha sign(theta), and for constant k it is the hinge energy
-(1/4) k l^2 / (2 A) theta^2, even in theta. The Hessian keeps the part (d2E/dtheta2) grad theta grad theta^T.
+the energy of an area is the work of bending it from flat on the straight path to K,
 
-Damping adds (eta / (2 dt)) k(0) (l^2 / (4 A)) (theta - theta_prev)^2.
+    W(K) = q_T(K),   T(k) = J(k) / k^2,   J(k) = int_0^k D(s) s ds,
 
-Sources: Wang, O'Brien, Ramamoorthi 2011 (table); Bridson, Marino, Fedkiw 2003 and Tamstorf, Grinspun 2013
-(gradient of the dihedral angle).
+D = (D11, D12, D22, D66) the rigidities, N m, piecewise linear between the curvatures 0, 10, 20, 30, 40 1/m
+and constant beyond. Rolled to a cylinder, the cloth needs the moment of the table; for constant D, W is
+q_D(K) / 2, the orthotropic plate. W is even in K, and its gradient is exact:
+
+    dW = 2 K^T T dK + q_T'(K) dk,   T' = (D - 2 T) / k.
+
+The Hessian is one of hinges, with the coefficient 4/3 A w . D(k) w of (d theta)^2 for K = sum w theta: it
+keeps to the hinges' own vertices, and the third stands for the coupling that it leaves out.
+
+Damping adds (eta / (2 dt)) q_D(0)(K - K_prev) to the energy of an area.
+
+Sources: Wang, O'Brien, Ramamoorthi 2011 (table); Timoshenko, Woinowsky-Krieger 1959 (orthotropic plate);
+Bridson, Marino, Fedkiw 2003 and Tamstorf, Grinspun 2013 (gradient of the dihedral angle).
 """
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+COUPLING = wp.constant(wp.float64(4.0 / 3.0))
+"""Stiffness of a hinge in the Hessian, over that of its own angle alone."""
+
 mat43d = wp.types.matrix(shape=(4, 3), dtype=wp.float64)
+curvaturev = wp.types.vector(length=3, dtype=wp.float64)
 
 
 @wp.struct
 class BendModel:
-    """Rest data of hinges, see `muslin.sim.cloth.ClothModel`; `moment` (H, 5): J at its curvatures."""
+    """Rest data: `hinges` (H,); `rest_area` (F,), m^2; the curvature of face f, sum of `weight` (N,), 1/m,
+    times the angles of hinges `member` (N,), both from offsets[f] to offsets[f + 1]; `rigidity` D, N m, and
+    `moment` J, N m / m^2, at curvatures in steps of `spacing`, 1/m; `slots` (H, 16) of the hinges' blocks."""
 
     hinges: wp.array(dtype=wp.vec4i)
-    length: wp.array(dtype=wp.float64)
-    area: wp.array(dtype=wp.float64)
-    stiffness: wp.array2d(dtype=wp.float64)
-    moment: wp.array2d(dtype=wp.float64)
+    rest_area: wp.array(dtype=wp.float64)
+    offsets: wp.array(dtype=wp.int32)
+    member: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=curvaturev)
+    rigidity: wp.array(dtype=wp.vec4d)
+    moment: wp.array(dtype=wp.vec4d)
+    spacing: wp.float64
     slots: wp.array2d(dtype=wp.int32)
+
+
+@wp.struct
+class BendState:
+    """Per hinge: `angle`, `torque` (dW/dtheta, N m) and `stiffness` (N m) of the Hessian."""
+
+    angle: wp.array(dtype=wp.float64)
+    torque: wp.array(dtype=wp.float64)
+    stiffness: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -59,91 +86,150 @@ def hinge_angle_gradient(x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d)
     one = wp.float64(1.0)
     g0 = g2 * (s2 - one) + g3 * (s3 - one)
     g1 = g2 * (-s2) + g3 * (-s3)
-    return mat43d(
-        g0[0], g0[1], g0[2], g1[0], g1[1], g1[2], g2[0], g2[1], g2[2], g3[0], g3[1], g3[2]
-    )
+    return mat43d(g0[0], g0[1], g0[2], g1[0], g1[1], g1[2], g2[0], g2[1], g2[2], g3[0], g3[1], g3[2])
 
 
 @wp.func
-def bend_response(
-    alpha: wp.float64, h: int, stiffness: wp.array2d(dtype=wp.float64), moment: wp.array2d(dtype=wp.float64)
-) -> wp.vec3d:
-    """J(alpha), k(alpha) alpha and its derivative with respect to alpha."""
-    step = wp.float64(5.0)
+def apply_form(c: wp.vec4d, k: curvaturev) -> curvaturev:
+    """Half the gradient of q_c at k."""
+    return curvaturev(c[0] * k[0] + c[1] * k[1], c[1] * k[0] + c[2] * k[1], wp.float64(4.0) * c[3] * k[2])
+
+
+@wp.struct
+class Rigidity:
+    """At one curvature k: D, T and T' / k."""
+
+    tangent: wp.vec4d
+    mean: wp.vec4d
+    slope: wp.vec4d
+
+
+@wp.func
+def rigidity_at(
+    k: wp.float64,
+    rigidity: wp.array(dtype=wp.vec4d),
+    moment: wp.array(dtype=wp.vec4d),
+    spacing: wp.float64,
+) -> Rigidity:
     half = wp.float64(0.5)
-    if alpha >= wp.float64(20.0):
-        k = stiffness[h, 4]
-        return wp.vec3d(moment[h, 4] + half * k * (alpha * alpha - wp.float64(400.0)), k * alpha, k)
-    i = wp.min(int(alpha / step), 3)
-    a0 = step * wp.float64(i)
-    s = alpha - a0
-    k0 = stiffness[h, i]
-    slope = (stiffness[h, i + 1] - k0) / step
-    k = k0 + slope * s
-    piece = k0 * (a0 * s + half * s * s) + slope * (half * a0 * s * s + s * s * s / wp.float64(3.0))
-    return wp.vec3d(moment[h, i] + piece, k * alpha, k + slope * alpha)
+    two = wp.float64(2.0)
+    out = Rigidity()
+    last = rigidity.shape[0] - 1
+    i = last
+    if k < spacing * wp.float64(last):
+        i = int(k / spacing)
+    start = spacing * wp.float64(i)
+    s = k - start
+    d0 = rigidity[i]
+    m = wp.vec4d()
+    if i < last:
+        m = (rigidity[i + 1] - d0) / spacing
+    out.tangent = d0 + m * s
+    if i == 0:
+        # Closed forms, exact down to k = 0.
+        out.mean = d0 * half + m * (k / wp.float64(3.0))
+        out.slope = m / (wp.float64(3.0) * wp.max(k, wp.float64(1.0e-30)))
+    else:
+        j = moment[i] + d0 * (start * s + half * s * s)
+        j += m * (half * start * s * s + s * s * s / wp.float64(3.0))
+        out.mean = j / (k * k)
+        out.slope = (out.tangent - out.mean * two) / (k * k)
+    return out
+
+
+@wp.func
+def face_curvature(f: int, model: BendModel, angle: wp.array(dtype=wp.float64)) -> curvaturev:
+    """K of a face, 1/m."""
+    k = curvaturev()
+    for a in range(model.offsets[f], model.offsets[f + 1]):
+        k += model.weight[a] * angle[model.member[a]]
+    return k
+
+
+@wp.func
+def norm(k: curvaturev) -> wp.float64:
+    return wp.sqrt(k[0] * k[0] + k[1] * k[1] + wp.float64(2.0) * k[2] * k[2])
+
+
+@wp.kernel
+def bend_angle(x: wp.array(dtype=wp.vec3d), model: BendModel, state: BendState):
+    """Dihedral angle of every hinge; clears torque and stiffness."""
+    h = wp.tid()
+    v = model.hinges[h]
+    state.angle[h] = hinge_angle(x[v[0]], x[v[1]], x[v[2]], x[v[3]])
+    state.torque[h] = wp.float64(0.0)
+    state.stiffness[h] = wp.float64(0.0)
+
+
+@wp.kernel
+def bend_curvature(model: BendModel, state: BendState, curvature: wp.array(dtype=curvaturev)):
+    """K of every face, from the angles in `state`."""
+    f = wp.tid()
+    curvature[f] = face_curvature(f, model, state.angle)
 
 
 @wp.kernel
 def bend_value(
-    x: wp.array(dtype=wp.vec3d),
     model: BendModel,
-    previous: wp.array(dtype=wp.float64),
+    state: BendState,
+    previous: wp.array(dtype=curvaturev),
     damping: wp.float64,
     energy: wp.array(dtype=wp.float64),
 ):
-    """energy[0] += sum over hinges of A J(alpha)."""
-    h = wp.tid()
-    v = model.hinges[h]
-    theta = hinge_angle(x[v[0]], x[v[1]], x[v[2]], x[v[3]])
-    scale = model.length[h] / (wp.float64(2.0) * model.area[h])
-    value = model.area[h] * bend_response(wp.abs(theta) * scale, h, model.stiffness, model.moment)[0]
+    """energy[0] += sum over faces of A W(K), from the angles in `state`; `damping` is eta / dt."""
+    f = wp.tid()
+    k = face_curvature(f, model, state.angle)
+    r = rigidity_at(norm(k), model.rigidity, model.moment, model.spacing)
+    w = wp.dot(k, apply_form(r.mean, k))
     if damping > wp.float64(0.0):
-        d = (theta - previous[h]) * scale
-        value += wp.float64(0.5) * damping * model.area[h] * model.stiffness[h, 0] * d * d
-    wp.atomic_add(energy, 0, value)
+        d = k - previous[f]
+        w += wp.float64(0.5) * damping * wp.dot(d, apply_form(model.rigidity[0], d))
+    wp.atomic_add(energy, 0, model.rest_area[f] * w)
+
+
+@wp.kernel
+def bend_torque(
+    model: BendModel,
+    state: BendState,
+    previous: wp.array(dtype=curvaturev),
+    damping: wp.float64,
+):
+    """Adds to torque and stiffness of the hinges what the faces have from the angles in `state`."""
+    f = wp.tid()
+    area = model.rest_area[f]
+    k = face_curvature(f, model, state.angle)
+    r = rigidity_at(norm(k), model.rigidity, model.moment, model.spacing)
+    along = wp.dot(k, apply_form(r.slope, k))
+    m = apply_form(r.mean, k) * wp.float64(2.0)
+    m += curvaturev(k[0], k[1], wp.float64(2.0) * k[2]) * along
+    tangent = r.tangent
+    if damping > wp.float64(0.0):
+        m += apply_form(model.rigidity[0], k - previous[f]) * damping
+        tangent += model.rigidity[0] * damping
+    for a in range(model.offsets[f], model.offsets[f + 1]):
+        w = model.weight[a]
+        wp.atomic_add(state.torque, model.member[a], area * wp.dot(w, m))
+        stiffness = COUPLING * area * wp.dot(w, apply_form(tangent, w))
+        wp.atomic_add(state.stiffness, model.member[a], stiffness)
 
 
 @wp.kernel
 def bend_derivatives(
     x: wp.array(dtype=wp.vec3d),
     model: BendModel,
-    previous: wp.array(dtype=wp.float64),
-    damping: wp.float64,
+    state: BendState,
     gradient: wp.array(dtype=wp.vec3d),
     hessian: wp.array(dtype=wp.mat33d),
 ):
-    """Adds the gradient, N, and the positive semi-definite Hessian blocks, N/m."""
+    """Adds the gradient, N, and the positive semi-definite Hessian blocks, N/m, of the torques in `state`."""
     h = wp.tid()
     v = model.hinges[h]
-    x0 = x[v[0]]
-    x1 = x[v[1]]
-    x2 = x[v[2]]
-    x3 = x[v[3]]
-    theta = hinge_angle(x0, x1, x2, x3)
-    grad = hinge_angle_gradient(x0, x1, x2, x3)
-    area = model.area[h]
-    scale = model.length[h] / (wp.float64(2.0) * area)
-    r = bend_response(wp.abs(theta) * scale, h, model.stiffness, model.moment)
-    torque = area * scale * r[1]
-    if theta < wp.float64(0.0):
-        torque = -torque
-    curvature = area * scale * scale * wp.max(r[2], wp.float64(0.0))
-    if damping > wp.float64(0.0):
-        k = damping * area * scale * scale * model.stiffness[h, 0]
-        torque += k * (theta - previous[h])
-        curvature += k
+    grad = hinge_angle_gradient(x[v[0]], x[v[1]], x[v[2]], x[v[3]])
+    torque = state.torque[h]
+    stiffness = state.stiffness[h]
     for i in range(int(0), int(4)):
         gi = wp.vec3d(grad[i, 0], grad[i, 1], grad[i, 2])
         wp.atomic_add(gradient, v[i], gi * torque)
         for j in range(int(0), int(4)):
             gj = wp.vec3d(grad[j, 0], grad[j, 1], grad[j, 2])
-            wp.atomic_add(hessian, model.slots[h, 4 * i + j], wp.outer(gi * curvature, gj))
-
-
-@wp.kernel
-def bend_angle(x: wp.array(dtype=wp.vec3d), model: BendModel, angle: wp.array(dtype=wp.float64)):
-    """Dihedral angle of every hinge."""
-    h = wp.tid()
-    v = model.hinges[h]
-    angle[h] = hinge_angle(x[v[0]], x[v[1]], x[v[2]], x[v[3]])
+            wp.atomic_add(hessian, model.slots[h, 4 * i + j], wp.outer(gi * stiffness, gj))

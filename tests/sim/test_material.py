@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from importlib import resources
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import quad
 
 from muslin.garments.errors import InputError
-from muslin.sim.material import Fabric, fabric_names, isotropic_fabric, load_fabric
+from muslin.sim.material import Fabric, bend_moments, fabric_names, isotropic_fabric, load_fabric
 
 NAMES = fabric_names()
 TABLE_FILE = resources.files("muslin.sim").joinpath("assets/wang2011_fabrics.toml")
@@ -130,3 +132,42 @@ def test_isotropic_sheet_refuses_what_is_not_a_material(key: str, value: float) 
     arguments = {"young": 1.0e6, "poisson": 0.3, "thickness": 1.0e-3, "density": 0.2} | {key: value}
     with pytest.raises(InputError, match=f"{key} = {value}"):
         isotropic_fabric(**arguments)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rigidities_give_back_the_hinge_table(name: str) -> None:
+    fabric = load_fabric(name)
+    d11, d12, d22, d66 = fabric.rigidity.T
+    np.testing.assert_allclose(d22, fabric.bend[0] / 4.0, rtol=1e-12)
+    np.testing.assert_allclose((d11 + d22 + 2.0 * d12 + 4.0 * d66) / 4.0, fabric.bend[1] / 4.0, rtol=1e-12)
+    np.testing.assert_allclose(d11, fabric.bend[2] / 4.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bending_is_positive_semi_definite_at_every_curvature(name: str) -> None:
+    d11, d12, d22, d66 = load_fabric(name).rigidity.T
+    assert (d66 >= 0.0).all()
+    assert (d11 * d22 - d12**2 >= 0.0).all()
+
+
+@pytest.mark.parametrize("poisson", [-0.5, 0.0, 0.3, 0.5])
+def test_isotropic_rigidities_are_the_plates(poisson: float) -> None:
+    rigidity = 2.0e6 * 4.0e-4**3 / (12.0 * (1.0 - poisson**2))
+    expected = rigidity * np.array([1.0, poisson, 1.0, 0.5 * (1.0 - poisson)])
+    np.testing.assert_allclose(sheet(poisson=poisson).rigidity, np.tile(expected, (5, 1)), rtol=1e-12)
+
+
+def test_scaling_bending_keeps_poissons_ratio() -> None:
+    np.testing.assert_allclose(sheet().scaled(bend=3.0).rigidity, 3.0 * sheet().rigidity, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bend_moments_are_the_integrals_of_the_rigidities(name: str) -> None:
+    rigidity = load_fabric(name).rigidity
+    curvatures = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
+    for d, moment in zip(rigidity.T, bend_moments(rigidity).T, strict=True):
+        pieces = [
+            quad(lambda k, d=d: np.interp(k, curvatures, d) * k, low, high)[0]
+            for low, high in pairwise(curvatures)
+        ]
+        np.testing.assert_allclose(moment, np.concatenate([[0.0], np.cumsum(pieces)]), rtol=1e-12, atol=1e-18)
