@@ -15,8 +15,8 @@ q_D(K) / 2, the orthotropic plate. W is even in K, and its gradient is exact:
 
     dW = 2 K^T T dK + q_T'(K) dk,   T' = (D - 2 T) / k.
 
-The Hessian is one of hinges, with the coefficient 4/3 A w . D(k) w of (d theta)^2 for K = sum w theta: it
-keeps to the hinges' own vertices, and the third stands for the coupling that it leaves out.
+The Hessian is one of hinges, with the coefficient 3/2 A w . D(k) w of (d theta)^2 for K = sum w theta: it
+keeps to the hinges' own vertices, and the half stands for the coupling that it leaves out.
 
 Damping adds (eta / (2 dt)) q_D(0)(K - K_prev) to the energy of an area.
 
@@ -28,7 +28,7 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-COUPLING = wp.constant(wp.float64(4.0 / 3.0))
+COUPLING = wp.constant(wp.float64(1.5))
 """Stiffness of a hinge in the Hessian, over that of its own angle alone."""
 
 mat43d = wp.types.matrix(shape=(4, 3), dtype=wp.float64)
