@@ -263,7 +263,7 @@ def test_hessian_is_symmetric_and_positive_semi_definite(patch: Bending) -> None
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_hessian_is_near_enough_for_newton_to_converge_where_flat(kind: str) -> None:
-    """Newton with H' in place of H converges where all eigenvalues of H against H' are below 2, fast where well below."""
+    """Newton with H' in place of H converges where all eigenvalues of H against H' are below 2."""
     mesh = sheet(kind, 0.08, 0.06, 0.01, 4)
     bending = Bending(build_cloth(mesh, ISOTROPIC))
     x = np.column_stack([mesh.panel_vertices, np.zeros(mesh.num_vertices)])
