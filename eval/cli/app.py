@@ -18,6 +18,7 @@ from muslin.eval.cli.pattern import pattern
 from muslin.eval.cli.render import render
 from muslin.eval.cli.report import report
 from muslin.eval.cli.simulate import simulate
+from muslin.eval.cli.validate import validate
 from muslin.eval.cli.verify import verify
 from muslin.eval.cli.view import view
 from muslin.garments.errors import InputError
@@ -89,6 +90,7 @@ for name, command, summary in (
     ("export", export, "Samples as OBJ, PLY, GLB, USD, PC2 or NPZ."),
     ("pattern", pattern, "A sewing pattern as file, mesh or drawing."),
     ("render", render, "Pictures and movies."),
+    ("validate", validate, "The simulator against known solutions."),
     ("view", view, "Look at a sample in a window."),
 ):
     app.command(name, short_help=summary)(command)

@@ -1,0 +1,1 @@
+"""The validation suite: the simulator against known solutions, case by case."""
