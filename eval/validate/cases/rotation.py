@@ -27,8 +27,8 @@ START_GAP = 0.8
 
 
 class RotationCase(CaseTable):
-    """`side` m of the sheet, `radius` m of the sphere; `friction` mu; `tolerance` m: largest move of a step of
-    `dt` s at rest, in at most `steps`; `bar` m."""
+    """`side` m of the sheet, `radius` m of the sphere; `friction` mu; `tolerance` m: largest move of a step
+    of `dt` s at rest, in at most `steps`; `bar` m."""
 
     young: Positive
     poisson: float
