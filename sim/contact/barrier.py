@@ -15,6 +15,7 @@ IPC" (area weights).
 
 import warp as wp
 
+from muslin.sim.contact.broad_phase import way_together
 from muslin.sim.contact.distance import pair_difference, pair_weights
 from muslin.sim.solve.block_matrix import BlockMatrix, add_pair
 
@@ -96,16 +97,31 @@ def pair_area(is_edge_edge: bool, pair: wp.vec4i, measure: PairMeasure) -> wp.fl
 @wp.kernel
 def barrier_value(
     x: wp.array(dtype=wp.vec3d),
+    way: wp.array(dtype=wp.float64),
+    step: wp.float64,
     reference: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
+    distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
     measure: PairMeasure,
+    out_distance: wp.array(dtype=wp.float64),
     energy: wp.array(dtype=wp.float64),
 ):
-    """energy[0] += sum of barrier energies. `reference` (start of the step) gives the lengths in c0."""
+    """energy[0] += sum of barrier energies at x, the end of a move of no more than `step` `way`.
+
+    `distance` bounds the distances before the move from below, `out_distance` after it: pairs that cannot
+    have come within range are not measured. `reference` (start of the step) gives the lengths in c0.
+    """
     k = wp.tid()
     pair = pairs[k]
+    bound = distance[k]
+    if bound > measure.range_:
+        bound = bound - step * way_together(is_edge_edge, pair, way)
+        if bound > measure.range_:
+            out_distance[k] = bound
+            return
     d = wp.length(difference(closest(is_edge_edge, pair, x), pair, x))
+    out_distance[k] = d
     s = d / measure.range_
     if s < wp.float64(1.0):
         m = mollifier(is_edge_edge, pair, x, reference)[0]
@@ -119,6 +135,7 @@ def barrier_derivatives(
     reference: wp.array(dtype=wp.vec3d),
     remaining: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
+    distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
     measure: PairMeasure,
     gradient: wp.array(dtype=wp.vec3d),
@@ -130,6 +147,8 @@ def barrier_derivatives(
     to the gradient, so that the Newton direction moves the cloth along with the collider.
     """
     k = wp.tid()
+    if distance[k] >= measure.range_:
+        return
     pair = pairs[k]
     w = closest(is_edge_edge, pair, x)
     r = difference(w, pair, x)
@@ -165,47 +184,11 @@ def barrier_derivatives(
 
 
 @wp.kernel
-def guard_pairs(
-    x: wp.array(dtype=wp.vec3d),
-    p: wp.array(dtype=wp.vec3d),
-    pairs: wp.array(dtype=wp.vec4i),
-    is_edge_edge: bool,
-    measure: PairMeasure,
-    gradient: wp.array(dtype=wp.vec3d),
-    matrix: BlockMatrix,
-):
-    """Adds a spring to the Newton system for every pair that the direction p would bring together.
-
-    To first order p changes the distance d of a pair by a = n . sum_i w_i p_i. Where d + a < 0.3 d, the
-    spring k (a + d / 2)^2 / 2 asks the next direction to leave it half its distance. Vertices of the collider
-    keep their p.
-    """
-    k = wp.tid()
-    pair = pairs[k]
-    w = closest(is_edge_edge, pair, x)
-    r = difference(w, pair, x)
-    d = wp.length(r)
-    n = r / d
-    approach = wp.float64(0.0)
-    carried = wp.float64(0.0)
-    for i in range(int(0), int(4)):
-        a = w[i] * wp.dot(n, p[pair[i]])
-        approach += a
-        if pair[i] >= measure.num_cloth:
-            carried += a
-    if approach >= wp.float64(-0.7) * d:
-        return
-    area = pair_area(is_edge_edge, pair, measure)
-    spring = wp.float64(10.0) * measure.stiffness * area / (measure.range_ * measure.range_)
-    along = n * (spring * (carried + wp.float64(0.5) * d))
-    add_pair(gradient, matrix, pair, w, measure.num_cloth, along, wp.outer(n * spring, n))
-
-
-@wp.kernel
 def active_pairs(
     x: wp.array(dtype=wp.vec3d),
     reference: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
+    distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
     measure: PairMeasure,
     count: wp.array(dtype=wp.int32),
@@ -217,6 +200,9 @@ def active_pairs(
 ):
     """Lists pairs within range: weights, unit normals, normal forces, N; tracks the smallest distance."""
     k = wp.tid()
+    if distance[k] >= measure.range_:
+        wp.atomic_min(nearest, 0, distance[k])
+        return
     pair = pairs[k]
     w = closest(is_edge_edge, pair, x)
     r = difference(w, pair, x)

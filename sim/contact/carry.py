@@ -1,16 +1,14 @@
-"""Where a time step begins: every cloth vertex goes along with the collider near it, as a Warp kernel.
+"""Where a time step begins: cloth goes along with the collider near it, as a Warp kernel.
 
-A collider that moves first and pushes cloth out of its way afterwards moves by one gap at a time. So cloth and
-collider start with a move that hardly changes their distances: with c the motion of the closest point of the
-collider, d its distance and u the way of the vertex in free flight, vertex i moves by
+A collider that moves first and pushes cloth out of its way afterwards moves by one gap at a time. So cloth
+and collider start with a move that hardly changes their distances: with c the motion of the closest point of
+the collider, d its distance and u the way that the velocity takes a vertex, the vertex moves by
 
     p = c + min(1, d / (2 |u - c|)) (u - c),
 
 relative to the collider by no more than half its distance. c alone is the motion to fall back on where two
-layers of cloth would meet: nearby vertices share it.
-
-Source: Li et al. 2020 make such a start with the collider's motion alone, in their handling of moving boundary
-conditions.
+layers of cloth would meet: vertices near each other share it. Gravity is not in u, since what lies on a body
+does not fall.
 """
 
 import numpy as np
@@ -20,7 +18,7 @@ from numpy.typing import NDArray
 wp.set_module_options({"enable_backward": False})
 
 NEAR = 0.1
-"""Metres within which a vertex goes along; farther ones fly freely."""
+"""Metres within which a vertex goes along; farther ones fly on."""
 
 
 @wp.kernel
@@ -35,7 +33,7 @@ def carried_moves(
 ):
     """base = c, p as above for cloth vertices, both `told` (V + N,) for those of the collider.
 
-    `free` (V,): where the vertices are after free flight, metres.
+    `free` (V,): where its velocity takes each vertex, metres.
     """
     i = wp.tid()
     if i >= num_cloth:
@@ -65,7 +63,7 @@ def carried_moves(
 
 
 class Carry:
-    """The collider's surface, asked for the motion of its closest points. `faces` (M, 3) index its vertices."""
+    """The collider's surface of `faces` (M, 3), asked for the motion of its closest points."""
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int32], device: str) -> None:
         self.device = device

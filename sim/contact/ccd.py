@@ -2,7 +2,7 @@
 
 Conservative advancement with distances only: while a pair is at distance d, no two of its points can meet
 before the time d / l, l the sum of the largest displacements of its two sides once the common motion is taken
-away. It stops when d has shrunk to the fraction `GAP` of its start, so a step never touches.
+away. It stops when d has shrunk to a fraction `gap` of its start, so a step never touches.
 
 A step can be limited for all vertices alike (`largest_safe_step`), or for each on its own: `cut_fractions`
 lowers the fractions f of the vertices of every pair that would touch, until all pairs are safe on
@@ -13,12 +13,13 @@ Source: Li, Kaufman, Jiang 2021, "Codimensional incremental potential contact", 
 
 import warp as wp
 
+from muslin.sim.contact.broad_phase import way_together
 from muslin.sim.contact.distance import pair_distance
 
 wp.set_module_options({"enable_backward": False})
 
 GAP = 0.2
-"""Fraction of the starting distance that every pair keeps."""
+"""Fraction of the starting distance that every pair keeps in a Newton move."""
 
 MAX_ADVANCES = 200
 
@@ -37,9 +38,10 @@ def advance_pair(
     m1: wp.vec3d,
     m2: wp.vec3d,
     m3: wp.vec3d,
+    gap: wp.float64,
     limit: wp.float64,
 ) -> wp.float64:
-    """Largest t up to `limit` such that a pair that moves by t m keeps GAP of its distance all the way."""
+    """Largest t up to `limit` such that a pair that moves by t m keeps `gap` of its distance all the way."""
     mean = (m0 + m1 + m2 + m3) * wp.float64(0.25)
     p0 = m0 - mean
     p1 = m1 - mean
@@ -52,7 +54,6 @@ def advance_pair(
     reach = l0 + wp.max(l1, wp.max(l2, l3))
     if is_edge_edge:
         reach = wp.max(l0, l1) + wp.max(l2, l3)
-    gap = wp.float64(GAP)
     one = wp.float64(1.0)
     d = pair_distance(is_edge_edge, x0, x1, x2, x3)
     keep = gap * d
@@ -83,12 +84,15 @@ def largest_safe_step(
     p: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
     is_edge_edge: bool,
+    gap: wp.float64,
     step: wp.array(dtype=wp.float64),
 ):
-    """step[0] = min(step[0], largest t such that the pair keeps GAP of its distance on x + [0, t] p)."""
+    """step[0] = min(step[0], largest t such that the pair keeps `gap` of its distance on x + [0, t] p)."""
     i = pairs[wp.tid()]
     a = step[0]
-    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], p[i[0]], p[i[1]], p[i[2]], p[i[3]], a)
+    t = advance_pair(
+        is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], p[i[0]], p[i[1]], p[i[2]], p[i[3]], gap, a
+    )
     if t < a:
         wp.atomic_min(step, 0, t)
 
@@ -104,27 +108,42 @@ def cut_fractions(
     x: wp.array(dtype=wp.vec3d),
     b: wp.array(dtype=wp.vec3d),
     p: wp.array(dtype=wp.vec3d),
+    way: wp.array(dtype=wp.float64),
     pairs: wp.array(dtype=wp.vec4i),
+    distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
+    gap: wp.float64,
+    before: wp.array(dtype=wp.float64),
     fraction: wp.array(dtype=wp.float64),
     out: wp.array(dtype=wp.float64),
     cut: wp.array(dtype=wp.int32),
 ):
     """Of every pair that is not safe on x + b + f (p - b), the f of its vertices go down with its safe step.
 
-    `fraction` f (V + N,) is read, `out` starts as a copy of it; cut[0] counts the pairs.
+    `fraction` f (V + N,) is read; pairs whose vertices have it from `before` are known to be safe.
+    `out` starts as a copy of f; cut[0] counts the pairs. `distance` bounds those at x from below, `way` the
+    moves from above.
     """
-    i = pairs[wp.tid()]
+    k = wp.tid()
+    i = pairs[k]
+    same = int(0)
+    for j in range(int(0), int(4)):
+        if before[i[j]] == fraction[i[j]]:
+            same += 1
+    if same == 4:
+        return
+    if (wp.float64(1.0) - gap) * distance[k] > way_together(is_edge_edge, i, way):
+        return
     m0 = part_of_way(b[i[0]], p[i[0]], fraction[i[0]])
     m1 = part_of_way(b[i[1]], p[i[1]], fraction[i[1]])
     m2 = part_of_way(b[i[2]], p[i[2]], fraction[i[2]])
     m3 = part_of_way(b[i[3]], p[i[3]], fraction[i[3]])
     one = wp.float64(1.0)
-    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], m0, m1, m2, m3, one)
+    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], m0, m1, m2, m3, gap, one)
     if t < one:
         wp.atomic_add(cut, 0, 1)
-        for k in range(int(0), int(4)):
-            wp.atomic_min(out, i[k], wp.float64(CUT) * t * fraction[i[k]])
+        for j in range(int(0), int(4)):
+            wp.atomic_min(out, i[j], wp.float64(CUT) * t * fraction[i[j]])
 
 
 @wp.kernel

@@ -29,13 +29,17 @@ from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.inertia import quadratic_gradient, quadratic_value, step_along
 from muslin.sim.solve.linear import LinearSystem
 
+CARRY_GAP = 0.5
+"""Share of its distance that every pair keeps while cloth goes along with the collider: more of a squeeze is
+left to the energy."""
+
 
 @dataclass(frozen=True)
 class SolverSettings:
     """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m:
     largest Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton
     once the collider has arrived, `max_advances` before, with `relaxations` in between where the way was
-    short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration;
+    short; `max_move` m an iteration;
     `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`; `air`, or None for a vacuum."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
@@ -46,7 +50,6 @@ class SolverSettings:
     max_iterations: int = 4
     max_advances: int = 30
     relaxations: int = 2
-    guards: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
     linear_tolerance: float = 0.1
@@ -109,11 +112,12 @@ class ClothSimulator:
         self.mass = wp.array(cloth.mass, dtype=wp.float64, device=device)
         self.carry = Carry(collider_vertices, collider_faces, device) if len(collider_faces) else None
         self._scalar = wp.zeros(1, dtype=wp.float64, device=device)
+        self._energy_here: float | None = None
         self.velocity = np.zeros((n, 3))
         self.pins = np.zeros(n, bool)
         self.work_left = np.inf
         self._gravity = wp.vec3d(*self.settings.gravity)
-        self.contact.search(self.x, self.p)
+        self.contact.search.search(self.x, self.p)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -183,7 +187,7 @@ class ClothSimulator:
         self.x.assign(x)
         self.velocity = velocity.copy()
         self.p.zero_()
-        self.contact.search(self.x, self.p)
+        self.contact.search.search(self.x, self.p)
 
     def _advance(
         self,
@@ -231,77 +235,73 @@ class ClothSimulator:
             self.air.begin_step(self.x, self.velocity if inertia else np.zeros((n, 3)))
         self.contact.begin_step(self.x, dt, friction)
         self._set_inertia(begin[:n], dt, inertia)
+        self._energy_here = None
         led = self._led()
         remaining = np.where(led[:, None], goal - begin, 0.0)
         arrived = not np.abs(remaining).max(initial=0.0) > 0.0
         fraction = 1.0
-        if not arrived and self.carry is not None and not np.abs(remaining[:n]).max() > 0.0:
-            fraction = self._go_along(remaining, dt)
-            arrived = fraction == 0.0
+        pins_move = np.abs(remaining[:n]).max() > 0.0
         iterations = advances = relaxing = 0
         while True:
-            moving = not arrived and relaxing == 0
-            self.remaining.assign(remaining * (fraction if moving else 0.0))
-            self._assemble(1.0 / dt)
-            share = fraction if moving else 0.0
-            for guard in range(s.guards + 1):
-                size, limit = self._direction(remaining[led] * share, led, moving, report)
-                if not moving:
-                    wp.copy(self.uncut, self.p)
-                    safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
-                    break
-                safe = self.contact.largest_step(self.x, self.p, self._scalar)
-                if safe >= 0.5 or guard == s.guards:
-                    break
-                self.contact.add_guards(self.x, self.p, self.gradient, self.linear.matrix)
-                if not self.linear.extras_fit():
-                    break
-            if moving:
-                self._move(safe)
+            if not arrived and relaxing == 0:
+                safe = self._lead(remaining * fraction, led, dt, pins_move or self.carry is None, report)
                 fraction *= 1.0 - safe
                 advances += 1
-                if safe >= 1.0 or fraction < 1e-9:
-                    fraction, arrived = 0.0, True
-                elif advances >= s.max_advances:
+                arrived = fraction < 1e-9
+                if not arrived and advances >= s.max_advances:
                     return False
-                # A short way means that something is squeezed: let it give way before the collider goes on.
-                relaxing = s.relaxations if safe < 0.5 else 0
-            else:
+                # What was not safe is squeezed: let it give way before the collider goes on.
+                relaxing = s.relaxations
+            self.remaining.zero_()
+            self._assemble(1.0 / dt)
+            size, limit = self._direction(remaining[led] * 0.0, led, False, report)
+            wp.copy(self.uncut, self.p)
+            safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
+            step = self._line_search(safe, 1.0 / dt)
+            if step == 0.0:
+                # Shortened here and there, the direction may not go downhill; as a whole it does.
+                wp.copy(self.p, self.uncut)
+                safe = self.contact.largest_step(self.x, self.p, self._scalar)
                 step = self._line_search(safe, 1.0 / dt)
-                if step == 0.0:
-                    # Shortened here and there, the direction may not go downhill; as a whole it does.
-                    wp.copy(self.p, self.uncut)
-                    safe = self.contact.largest_step(self.x, self.p, self._scalar)
-                    step = self._line_search(safe, 1.0 / dt)
-                relaxing -= 1
-                if not arrived:
-                    continue
-                iterations += 1
-                report.last_move = step * limit * size
-                report.converged = size < s.tolerance
-                solved = report.converged and iterations >= s.min_iterations
-                # A direction along which nothing can be gained would come out the same again.
-                if solved or step == 0.0 or iterations >= s.max_iterations:
-                    break
+            relaxing = max(relaxing - 1, 0)
+            if not arrived:
+                continue
+            iterations += 1
+            report.last_move = step * limit * size
+            report.converged = size < s.tolerance
+            solved = report.converged and iterations >= s.min_iterations
+            # A direction along which nothing can be gained would come out the same again.
+            if solved or step == 0.0 or iterations >= s.max_iterations:
+                break
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
         return True
 
-    def _go_along(self, remaining: NDArray[np.float64], dt: float) -> float:
-        """Move the collider, and the cloth along with it; returns the share of the way that is left."""
-        assert self.carry is not None
-        n = self.cloth.num_vertices
-        self.remaining.assign(remaining)
-        free = wp.array(
-            self.target.numpy() + dt**2 * np.array(self._gravity), dtype=wp.vec3d, device=self.device
-        )
-        self.carry.moves(self.x, self.remaining, free, self.base, self.p)
-        moves = np.stack([self.p.numpy(), self.base.numpy()])
-        shared = moves[0, :n].mean(axis=0)
-        reach = float(np.sqrt(((moves - shared) ** 2).sum(axis=2).max()))
-        self.contact.cover(self.x, self.p, reach, shared, self.base)
-        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base)
+    def _lead(
+        self, way: NDArray[np.float64], led: NDArray[np.bool_], dt: float, by_newton: bool, report: StepReport
+    ) -> float:
+        """Move collider and pins by what is safe of their `way` (V + N, 3); returns its share.
+
+        The cloth goes along with the collider near it, or where the Newton direction takes it that knows of
+        the way: pins pull on the cloth, and only the elastic energy knows how.
+        """
+        self.remaining.assign(way)
+        if not by_newton:
+            return self._go_along()
+        self._assemble(1.0 / dt)
+        self._direction(way[led], led, True, report)
+        safe = self.contact.largest_step(self.x, self.p, self._scalar)
         self._move(safe)
-        return 1.0 - safe
+        return safe
+
+    def _go_along(self) -> float:
+        """Move the collider by what `remaining` tells it, and the cloth with it, as far as is safe."""
+        assert self.carry is not None
+        self.carry.moves(self.x, self.remaining, self.target, self.base, self.p)
+        shared = self.p.numpy()[: self.cloth.num_vertices].mean(axis=0)
+        self.contact.search.cover(self.x, self.p, shared, self.base)
+        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base, CARRY_GAP)
+        self._move(safe)
+        return safe
 
     def _direction(
         self, told: NDArray[np.float64], led: NDArray[np.bool_], moving: bool, report: StepReport
@@ -331,9 +331,8 @@ class ClothSimulator:
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
         limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
         self.p.assign(p * limit)
-        shared = p[:n].mean(axis=0) if moving else np.zeros(3)
-        reach = float(np.sqrt(((p - shared) ** 2).sum(axis=1).max()))
-        self.contact.cover(self.x, self.p, limit * reach, limit * shared)
+        shared = limit * p[:n].mean(axis=0) if moving else None
+        self.contact.search.cover(self.x, self.p, shared)
         return size, limit
 
     def _led(self) -> NDArray[np.bool_]:
@@ -371,27 +370,40 @@ class ClothSimulator:
             if self.linear.extras_fit():
                 return
 
-    def _energy(self, x: wp.array, inverse_dt: float) -> float:
+    def _energy(self, x: wp.array, step: float, inverse_dt: float) -> float:
+        """Value of the potential at x, which is `step` p away from where the vertices are."""
         self._scalar.zero_()
         args = [x, self.target, self.weight, self.mass, self._gravity, self._scalar]
         wp.launch(quadratic_value, self.cloth.num_vertices, args, device=self.device)
         self.elastic.add_value(x, inverse_dt, self._scalar)
         if self.air is not None:
             self.air.add_value(x, self.start, inverse_dt, self._scalar)
-        self.contact.add_value(x, self.start, self._scalar)
+        self.contact.add_value(x, step, self.start, self._scalar)
         return float(self._scalar.numpy()[0])
 
-    def _move(self, step: float) -> None:
+    def _go(self, step: float) -> None:
+        """trial = x + step p"""
         wp.launch(step_along, len(self.x), [self.x, self.p, step, self.trial], device=self.device)
+
+    def _move(self, step: float) -> None:
+        """Go `step` p, wherever the energy goes."""
+        self._go(step)
         self.x, self.trial = self.trial, self.x
+        self.contact.forget_distances()
+        self._energy_here = None
 
     def _line_search(self, step: float, inverse_dt: float) -> float:
         """Backtrack from `step` until the energy falls; zero if it never does."""
-        before = self._energy(self.x, inverse_dt)
+        if self._energy_here is None:
+            self._energy_here = self._energy(self.x, 0.0, inverse_dt)
+            self.contact.accept_trial()
         for _ in range(self.settings.max_backtracks):
-            wp.launch(step_along, len(self.x), [self.x, self.p, step, self.trial], device=self.device)
-            if self._energy(self.trial, inverse_dt) < before:
+            self._go(step)
+            energy = self._energy(self.trial, step, inverse_dt)
+            if energy < self._energy_here:
                 self.x, self.trial = self.trial, self.x
+                self.contact.accept_trial()
+                self._energy_here = energy
                 return step
             step *= 0.5
         return 0.0

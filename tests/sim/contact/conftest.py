@@ -55,7 +55,7 @@ class Soup:
 
     def search(self, points, move=None) -> None:
         move = np.zeros_like(points) if move is None else move
-        self.contact.search(self.array(points), self.array(move))
+        self.contact.search.search(self.array(points), self.array(move))
 
     def pairs(self, is_edge_edge: bool) -> np.ndarray:
         """(K, 4) vertices of the listed pairs."""
@@ -65,7 +65,8 @@ class Soup:
     def energy(self, points, start) -> float:
         """Of barrier and friction, joules."""
         total = wp.zeros(1, dtype=wp.float64, device="cpu")
-        self.contact.add_value(self.array(points), self.array(start), total)
+        self.contact.forget_distances()
+        self.contact.add_value(self.array(points), 0.0, self.array(start), total)
         return float(total.numpy()[0])
 
     def derivatives(self, points, start, remaining=None) -> tuple[np.ndarray, np.ndarray]:

@@ -90,18 +90,41 @@ def test_a_covered_move_needs_no_search_and_misses_nothing(make_soup, closest, i
     soup = make_soup(20, 20)
     points = random_soup(40, seed=2)
     soup.search(points)
-    searches = soup.contact._searches
+    searches = soup.contact.search.searches
     draw = np.random.default_rng(4)
     for _ in range(4):
         move = draw.normal(size=points.shape)
         move *= 0.12 * MARGIN / np.linalg.norm(move, axis=1, keepdims=True)
-        soup.contact.cover(soup.array(points), soup.array(move), 0.12 * MARGIN)
+        soup.contact.search.cover(soup.array(points), soup.array(move))
         points = points + move
         wanted = near(closest, soup, [points], is_edge_edge, RANGE)
         assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
-    assert soup.contact._searches == searches
-    soup.contact.cover(soup.array(points), soup.array(0.0 * points), 0.12 * MARGIN)
-    assert soup.contact._searches == searches + 1
+    assert soup.contact.search.searches == searches
+    soup.contact.search.cover(soup.array(points), soup.array(np.full_like(points, 0.02 * MARGIN)))
+    assert soup.contact.search.searches == searches + 1
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_after_looking_for_hot_vertices_alone_nothing_is_missing_or_listed_twice(
+    make_soup, closest, is_edge_edge
+):
+    """A few triangles of cloth wander far, one after the other, the others hardly."""
+    soup = make_soup(40, 10)
+    points = random_soup(50, seed=12, box=0.02)
+    soup.search(points)
+    searches = soup.contact.search.searches
+    draw = np.random.default_rng(5)
+    for round_ in range(6):
+        move = 0.02 * MARGIN * draw.normal(size=points.shape)
+        move[3 * soup.num_cloth // 3 :] = 0.0
+        move[9 * round_ : 9 * round_ + 9] += 0.01 * draw.normal(size=3)
+        soup.contact.search.cover(soup.array(points), soup.array(move))
+        path = [points + t * move for t in np.linspace(0, 1, 5)]
+        listed = keys(soup.pairs(is_edge_edge), is_edge_edge)
+        assert near(closest, soup, path, is_edge_edge, RANGE) <= set(listed)
+        assert len(set(listed)) == len(listed)
+        points = points + move
+    assert soup.contact.search.searches == searches
 
 
 @pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
@@ -119,7 +142,7 @@ def test_ways_that_may_end_anywhere_between_two_moves_are_covered(make_soup, clo
     points = random_soup(30, seed=6, box=0.02)
     draw = np.random.default_rng(8)
     base, move = 0.01 * draw.normal(size=(2, *points.shape)) + np.array([0.3, 0.0, 0.1])
-    soup.contact.search(soup.array(points), soup.array(move), None, soup.array(base))
+    soup.contact.search.search(soup.array(points), soup.array(move), None, soup.array(base))
     shares = [0.0, 1.0, 0.5] + [draw.uniform(size=(len(points), 1)) for _ in range(5)]
     path = [points + t * (base + f * (move - base)) for f in shares for t in (0.5, 1.0)]
     wanted = near(closest, soup, path, is_edge_edge, RANGE)
@@ -133,7 +156,7 @@ def test_neighbours_are_no_pairs(grid_mesh):
     contact = ContactSystem(cloth, np.zeros((0, 3), np.int32), 0, ContactSettings(), "cpu")
     flat = np.insert(mesh.panel_vertices, 2, 0.0, axis=1)
     x = wp.array(flat, dtype=wp.vec3d, device="cpu")
-    contact.search(x, wp.zeros_like(x))
+    contact.search.search(x, wp.zeros_like(x))
     for pairs in contact.lists:
         listed = pairs.pairs.numpy()[: pairs.length]
         assert len(listed) > 50
