@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import igl
 import numpy as np
@@ -23,6 +25,7 @@ class ClothModel:
     `rest_area` (F,) m^2; `mass` (V,) kg; `vertex_area` (V,) and `edge_area` (E,) m^2.
     The curvature (K11, K22, K12) of face f is the sum of `curvature_weights` (N, 3), 1/m, times the angles of
     `curvature_hinges` (N,), both from curvature_offsets[f] to curvature_offsets[f + 1].
+    `face_fabric` (F,): place in `fabrics` of the fabric of each face.
     """
 
     faces: NDArray[np.int32]
@@ -36,7 +39,8 @@ class ClothModel:
     curvature_offsets: NDArray[np.int32]
     curvature_hinges: NDArray[np.int32]
     curvature_weights: NDArray[np.float64]
-    fabric: Fabric
+    face_fabric: NDArray[np.int32]
+    fabrics: tuple[Fabric, ...]
 
     @property
     def num_vertices(self) -> int:
@@ -90,8 +94,34 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
         curvature_offsets=offsets,
         curvature_hinges=members,
         curvature_weights=weights,
-        fabric=fabric,
+        face_fabric=np.zeros(len(faces), np.int32),
+        fabrics=(fabric,),
     )
+
+
+def merge_cloths(cloths: Sequence[ClothModel]) -> ClothModel:
+    """One cloth of several that share no vertex, in this order, each of its own fabrics."""
+    vertices, hinges, members, fabrics = (
+        np.cumsum([0, *counts])[:-1]
+        for counts in (
+            [cloth.num_vertices for cloth in cloths],
+            [len(cloth.hinges) for cloth in cloths],
+            [len(cloth.curvature_hinges) for cloth in cloths],
+            [len(cloth.fabrics) for cloth in cloths],
+        )
+    )
+    shift = {"faces": vertices, "edges": vertices, "hinges": vertices, "face_fabric": fabrics}
+    shift |= {"curvature_hinges": hinges, "curvature_offsets": members}
+    joined: dict[str, Any] = {}
+    for name in (entry.name for entry in fields(ClothModel) if entry.name != "fabrics"):
+        arrays = [getattr(cloth, name) for cloth in cloths]
+        if name in shift:
+            arrays = [array + array.dtype.type(by) for array, by in zip(arrays, shift[name], strict=True)]
+        if name == "curvature_offsets":
+            # The end of one cloth's list is the beginning of the next one's.
+            arrays = [arrays[0], *(array[1:] for array in arrays[1:])]
+        joined[name] = np.concatenate(arrays)
+    return ClothModel(fabrics=tuple(fabric for cloth in cloths for fabric in cloth.fabrics), **joined)
 
 
 def _curvature(

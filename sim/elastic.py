@@ -41,21 +41,23 @@ class ElasticEnergy:
         stretch.faces = wp.array(cloth.faces, dtype=wp.vec3i, device=device)
         stretch.inverse_rest = wp.array(cloth.inverse_rest, dtype=wp.mat22d, device=device)
         stretch.rest_area = wp.array(cloth.rest_area, **f64)
-        stretch.fabric = wp.zeros(self.num_faces, dtype=wp.int32, device=device)
-        stretch.rest = wp.array(cloth.fabric.stretch_rest[None], **f64)
-        stretch.strained = wp.array(cloth.fabric.stretch_strained[None], **f64)
+        stretch.fabric = wp.array(cloth.face_fabric, dtype=wp.int32, device=device)
+        stretch.rest = wp.array(np.stack([f.stretch_rest for f in cloth.fabrics]), **f64)
+        stretch.strained = wp.array(np.stack([f.stretch_strained for f in cloth.fabrics]), **f64)
         stretch.slots = wp.array(cloth.slots(cloth.faces), dtype=wp.int32, device=device)
         self.stretch = stretch
 
-        rigidity = cloth.fabric.rigidity
+        rigidity = [fabric.rigidity for fabric in cloth.fabrics]
         bend = BendModel()
         bend.hinges = wp.array(cloth.hinges, dtype=wp.vec4i, device=device)
         bend.rest_area = stretch.rest_area
         bend.offsets = wp.array(cloth.curvature_offsets, dtype=wp.int32, device=device)
         bend.member = wp.array(cloth.curvature_hinges, dtype=wp.int32, device=device)
         bend.weight = wp.array(cloth.curvature_weights, dtype=curvaturev, device=device)
-        bend.rigidity = wp.array(rigidity, dtype=wp.vec4d, device=device)
-        bend.moment = wp.array(bend_moments(rigidity), dtype=wp.vec4d, device=device)
+        bend.fabric = stretch.fabric
+        bend.rigidity = wp.array(np.stack(rigidity), dtype=wp.vec4d, device=device)
+        moments = [bend_moments(d) for d in rigidity]
+        bend.moment = wp.array(np.stack(moments), dtype=wp.vec4d, device=device)
         # A cylinder of curvature k folds the table's hinges by half of it.
         bend.spacing = 2.0 * BEND_CURVATURE_STEP
         bend.slots = wp.array(cloth.slots(cloth.hinges), dtype=wp.int32, device=device)

@@ -38,16 +38,18 @@ curvaturev = wp.types.vector(length=3, dtype=wp.float64)
 @wp.struct
 class BendModel:
     """Rest data: `hinges` (H,); `rest_area` (F,), m^2; the curvature of face f, sum of `weight` (N,), 1/m,
-    times the angles of hinges `member` (N,), both from offsets[f] to offsets[f + 1]; `rigidity` D, N m, and
-    `moment` J, N m / m^2, at curvatures in steps of `spacing`, 1/m; `slots` (H, 16) of the hinges' blocks."""
+    times the angles of hinges `member` (N,), both from offsets[f] to offsets[f + 1]; of each `fabric` (F,),
+    a row each, `rigidity` D, N m, and `moment` J, N m / m^2, at curvatures in steps of `spacing`, 1/m;
+    `slots` (H, 16) of the hinges' blocks."""
 
     hinges: wp.array(dtype=wp.vec4i)
     rest_area: wp.array(dtype=wp.float64)
     offsets: wp.array(dtype=wp.int32)
     member: wp.array(dtype=wp.int32)
     weight: wp.array(dtype=curvaturev)
-    rigidity: wp.array(dtype=wp.vec4d)
-    moment: wp.array(dtype=wp.vec4d)
+    fabric: wp.array(dtype=wp.int32)
+    rigidity: wp.array2d(dtype=wp.vec4d)
+    moment: wp.array2d(dtype=wp.vec4d)
     spacing: wp.float64
     slots: wp.array2d(dtype=wp.int32)
 
@@ -107,30 +109,31 @@ class Rigidity:
 @wp.func
 def rigidity_at(
     k: wp.float64,
-    rigidity: wp.array(dtype=wp.vec4d),
-    moment: wp.array(dtype=wp.vec4d),
+    fabric: int,
+    rigidity: wp.array2d(dtype=wp.vec4d),
+    moment: wp.array2d(dtype=wp.vec4d),
     spacing: wp.float64,
 ) -> Rigidity:
     half = wp.float64(0.5)
     two = wp.float64(2.0)
     out = Rigidity()
-    last = rigidity.shape[0] - 1
+    last = rigidity.shape[1] - 1
     i = last
     if k < spacing * wp.float64(last):
         i = int(k / spacing)
     start = spacing * wp.float64(i)
     s = k - start
-    d0 = rigidity[i]
+    d0 = rigidity[fabric, i]
     m = wp.vec4d()
     if i < last:
-        m = (rigidity[i + 1] - d0) / spacing
+        m = (rigidity[fabric, i + 1] - d0) / spacing
     out.tangent = d0 + m * s
     if i == 0:
         # Closed forms, exact down to k = 0.
         out.mean = d0 * half + m * (k / wp.float64(3.0))
         out.slope = m / (wp.float64(3.0) * wp.max(k, wp.float64(1.0e-30)))
     else:
-        j = moment[i] + d0 * (start * s + half * s * s)
+        j = moment[fabric, i] + d0 * (start * s + half * s * s)
         j += m * (half * start * s * s + s * s * s / wp.float64(3.0))
         out.mean = j / (k * k)
         out.slope = (out.tangent - out.mean * two) / (k * k)
@@ -179,11 +182,12 @@ def bend_value(
     """energy[0] += sum over faces of A W(K), from the angles in `state`; `damping` is eta / dt."""
     f = wp.tid()
     k = face_curvature(f, model, state.angle)
-    r = rigidity_at(norm(k), model.rigidity, model.moment, model.spacing)
+    fabric = model.fabric[f]
+    r = rigidity_at(norm(k), fabric, model.rigidity, model.moment, model.spacing)
     w = wp.dot(k, apply_form(r.mean, k))
     if damping > wp.float64(0.0):
         d = k - previous[f]
-        w += wp.float64(0.5) * damping * wp.dot(d, apply_form(model.rigidity[0], d))
+        w += wp.float64(0.5) * damping * wp.dot(d, apply_form(model.rigidity[fabric, 0], d))
     wp.atomic_add(energy, 0, model.rest_area[f] * w)
 
 
@@ -198,14 +202,15 @@ def bend_torque(
     f = wp.tid()
     area = model.rest_area[f]
     k = face_curvature(f, model, state.angle)
-    r = rigidity_at(norm(k), model.rigidity, model.moment, model.spacing)
+    fabric = model.fabric[f]
+    r = rigidity_at(norm(k), fabric, model.rigidity, model.moment, model.spacing)
     along = wp.dot(k, apply_form(r.slope, k))
     m = apply_form(r.mean, k) * wp.float64(2.0)
     m += curvaturev(k[0], k[1], wp.float64(2.0) * k[2]) * along
     tangent = r.tangent
     if damping > wp.float64(0.0):
-        m += apply_form(model.rigidity[0], k - previous[f]) * damping
-        tangent += model.rigidity[0] * damping
+        m += apply_form(model.rigidity[fabric, 0], k - previous[f]) * damping
+        tangent += model.rigidity[fabric, 0] * damping
     for a in range(model.offsets[f], model.offsets[f + 1]):
         w = model.weight[a]
         wp.atomic_add(state.torque, model.member[a], area * wp.dot(w, m))
