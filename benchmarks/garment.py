@@ -7,8 +7,8 @@ import numpy as np
 from benchmarks.setting import Setting
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import ClothModel, build_cloth
-from muslin.sim.material import load_fabric
 from muslin.sim.scene import load_scene
+from muslin.sim.setting import fabric_of
 
 SCENE = "scenes/tshirt_walk.toml"
 
@@ -32,4 +32,5 @@ def garment(setting: Setting) -> GarmentMesh:
 
 def cloth_model(setting: Setting) -> ClothModel:
     """Its rest geometry in the fabric of the scene."""
-    return build_cloth(garment(setting), load_fabric(load_scene(SCENE).fabric))
+    scene = load_scene(SCENE)
+    return build_cloth(garment(setting), fabric_of(scene, scene.garment))

@@ -12,7 +12,6 @@ from muslin.sim.body.load import load_body
 from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.device import open_device
-from muslin.sim.material import load_fabric
 from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import load_motion
 from muslin.sim.motion.grounding import fit_to_body
@@ -20,6 +19,7 @@ from muslin.sim.motion.lead_in import lead_in
 from muslin.sim.relax import settle
 from muslin.sim.run import cut_garment
 from muslin.sim.scene import Scene, load_scene
+from muslin.sim.setting import fabric_of
 from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
 from muslin.sim.wear import WornGarment
 
@@ -41,7 +41,7 @@ def make_setting(frames: int, edge_length: float | None = None, scene_file: str 
     if scene.body is None or scene.motion is None:
         raise ValueError(f"{scene_file}: a setting needs [body] and [motion]")
     mesh = cut_garment(scene)
-    fabric = load_fabric(scene.fabric)
+    fabric = fabric_of(scene, scene.garment)
     cloth = build_cloth(mesh, fabric)
     model = load_body(scene.body.model)
     beta = np.zeros(model.num_betas)
@@ -53,7 +53,7 @@ def make_setting(frames: int, edge_length: float | None = None, scene_file: str 
         raise ValueError(f"frames = {frames}: {scene.motion.clip} of {scene_file} has {most}")
 
     contact, solver = settings_of(scene)
-    worn = WornGarment(mesh, cloth, model, beta, contact, solver, "cpu")
+    worn = WornGarment([mesh], [cloth], model, beta, contact, solver, "cpu")
     way_in = lead_in(clip, LEAD_IN_SECONDS, 1.0 / DT)
     worn.carry(way_in.poses[0], way_in.translations[0])
     for theta, translation in zip(way_in.poses[1:], way_in.translations[1:], strict=True):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.elastic import principal_stretches
+from muslin.sim.relax import RestReport
+from muslin.sim.scene import Scene
 
 
 def certify(sample: Sample, cloth: ClothModel, base: Certificate) -> Sample:
@@ -37,4 +41,23 @@ def certify(sample: Sample, cloth: ClothModel, base: Certificate) -> Sample:
             masked_body_faces_max=masked,
             largest_strain=stretch - 1.0,
         ),
+    )
+
+
+def solved(
+    scene: Scene, distance: float, rest: RestReport | None, started: float, frames: int
+) -> Certificate:
+    """What the solver knows of a sample: `distance` m at the closest, how it came to `rest`, versions, and
+    the seconds since `started`, a time of `time.perf_counter`."""
+    seconds = time.perf_counter() - started
+    extra: dict[str, float | int | bool] = {"seconds_per_frame": seconds / frames}
+    if rest is not None:
+        extra |= {"settle_steps": rest.steps, "last_move_m": rest.moved, "at_rest": rest.at_rest}
+    return Certificate(
+        min_distance_m=distance if np.isfinite(distance) else None,
+        force_residual=None if rest is None else rest.residual,
+        seed=scene.seed,
+        seconds=seconds,
+        versions={name: version(name) for name in ("muslin", "warp-lang", "numpy", "ipctk")},
+        extra=extra,
     )

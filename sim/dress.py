@@ -45,14 +45,17 @@ def grow_body(
     beta: NDArray[np.float64],
     vertices: NDArray[np.float64],
     tick: Callable[[], None] | None = None,
+    weights: NDArray[np.float64] | None = None,
 ) -> None:
     """Let the seams of a placed garment contract, then grow the body from its skeleton to `vertices`.
 
     `sim` holds the garment of `place` around `shrunk_body(..., LEAST_GIRTH)`. Weightless and without
-    friction, so that the garment finds its own place on the body. InputError where it does not enclose the
-    skeleton: no step could bring it around.
+    friction, so that the garment finds its own place on the body. With `weights`, the collider is the body
+    and what it wears, as `shrunk_body` says. InputError where the garment does not enclose the skeleton: no
+    step could bring it around.
     """
-    counts = count_intersections(sim.positions, sim.cloth.faces, sim.collider_vertices, model.faces)
+    worn = sim.contact.collider_faces
+    counts = count_intersections(sim.positions, sim.cloth.faces, sim.collider_vertices, worn)
     if counts.cloth_cloth or counts.cloth_body:
         raise InputError(
             f"the garment cannot be put on: placed around the skeleton of body {model.name!r} it has "
@@ -62,7 +65,7 @@ def grow_body(
     sim.set_gravity((0.0, 0.0, 0.0))
     for step in range(RELAX_STEPS + GROW_STEPS):
         share = max(0, step + 1 - RELAX_STEPS) / GROW_STEPS
-        goal = shrunk_body(model, beta, vertices, LEAST_GIRTH + (1.0 - LEAST_GIRTH) * share)
+        goal = shrunk_body(model, beta, vertices, LEAST_GIRTH + (1.0 - LEAST_GIRTH) * share, weights)
         # The last step lands on the body itself, not on what rounding makes of it.
         goal = vertices if share == 1.0 else goal
         sim.advance(goal, DRESS_DT, inertia=False, friction=False)
@@ -72,12 +75,18 @@ def grow_body(
 
 
 def shrunk_body(
-    model: BodyModel, beta: NDArray[np.float64], vertices: NDArray[np.float64], girth: float
+    model: BodyModel,
+    beta: NDArray[np.float64],
+    vertices: NDArray[np.float64],
+    girth: float,
+    weights: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """The body in its rest pose with every vertex drawn towards its bones: c + girth (v - c), (N, 3).
 
-    c is the average, by skinning weight, of the closest points on the bones.
+    c is the average, by skinning weight, of the closest points on the bones. The `weights` (N, J) are the
+    model's own unless given, for vertices that are not the body's alone.
     """
+    weights = model.weights if weights is None else weights
     joints = model.joints(beta)
     centre = np.zeros_like(vertices)
     for joint in range(len(joints)):
@@ -89,7 +98,7 @@ def shrunk_body(
             b = a + along / np.linalg.norm(along) * LEAF_LENGTH[joint]
         direction = b - a
         t = np.clip((vertices - a) @ direction / (direction @ direction), 0.0, 1.0)
-        centre += model.weights[:, joint, None] * (a + t[:, None] * direction)
+        centre += weights[:, joint, None] * (a + t[:, None] * direction)
     return centre + girth * (vertices - centre)
 
 

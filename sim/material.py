@@ -10,6 +10,7 @@ import tomllib
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +105,11 @@ def load_fabric(name: str) -> Fabric:
     table = _table()
     if name not in table:
         raise InputError(f"fabric = {name!r}: unknown; choose one of {', '.join(sorted(table))}")
-    entry = table[name]
+    return fabric_from_table(name, table[name])
+
+
+def fabric_from_table(name: str, entry: dict[str, Any]) -> Fabric:
+    """A fabric of the values that the tables hold, made admissible as `load_fabric` says."""
     return Fabric(
         name=name,
         density=float(entry["density"]),

@@ -1,41 +1,82 @@
-"""Scene files: one garment on one body (or another collider), draped or in motion, as typed TOML."""
+"""Scene files: garments on one body, or cloth among other colliders, at rest or in motion, as typed TOML."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
+from muslin.sim.table_errors import explain
+from muslin.sim.tables import ZERO, Finite, Positive, RepeatTable, Table, Vector
 from muslin.sim.toml_values import read_values
+from muslin.sim.world.tables import AirTable, ColliderTable, PinTable, SequenceTable
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=2.0)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class IsotropicTable(Table):
+    """A fabric alike in every direction: `young` Pa, `poisson`, `thickness` m, `density` kg/m^2."""
+
+    young: Positive
+    poisson: Annotated[float, Field(gt=-1.0, le=0.5)]
+    thickness: Positive
+    density: Positive
 
 
-class GarmentTable(_Table):
+def _is_table(value: Any) -> str:
+    return "isotropic" if isinstance(value, dict | IsotropicTable) else "name"
+
+
+FabricChoice = Annotated[
+    Annotated[str, Tag("name")] | Annotated[IsotropicTable, Tag("isotropic")], Discriminator(_is_table)
+]
+"""A measured fabric by name, a fabric file (`FILE.toml`, or `FILE.toml:NAME` where it holds several), or a
+table {young, poisson, thickness, density}."""
+
+
+class FabricScale(Table):
+    """Multipliers of the fabric's density, stretch and bending stiffness."""
+
+    density: Positive = 1.0
+    stretch: Positive = 1.0
+    bend: Positive = 1.0
+
+
+class GarmentTable(Table):
     """What is worn: a catalogue design (`design`, `preset`, `parameters`) or a `pattern` file, cut at
-    `edge_length` metres, or a design's `template` of about that many vertices."""
+    `edge_length` metres, or a design's `template` of about that many vertices.
+
+    Without a body one flat panel: its origin at `position` m, its x along +x and its y along -z, face up,
+    then turned by `rotation`, an axis-angle vector in radians; `repeat` gives it copies.
+    """
 
     design: str = "tee"
     preset: str | None = None
-    parameters: dict[str, Finite] = {}
+    parameters: dict[str, Finite] = Field(default={})
     pattern: str | None = None
     edge_length: Annotated[float, Field(ge=2e-3, le=0.2)] = 0.02
     template: int | None = None
     seed: Annotated[int, Field(ge=0)] = 0
+    position: Vector = ZERO
+    rotation: Vector = ZERO
+    repeat: RepeatTable | None = None
 
 
-class BodyTable(_Table):
+class LayerTable(GarmentTable):
+    """One more garment, worn over those before it, or one more sheet.
+
+    Of the scene's fabric and multipliers if it names none; multipliers of a fabric of its own are 1.
+    """
+
+    fabric: FabricChoice | None = None
+    fabric_scale: FabricScale | None = None
+
+
+class BodyTable(Table):
     """Who wears it: `model` female, male, neutral or an SMPL file; `beta` in standard deviations; `pose` of
     drapes."""
 
@@ -44,14 +85,7 @@ class BodyTable(_Table):
     pose: Literal["a", "t"] = "a"
 
 
-class ColliderTable(_Table):
-    """Instead of a body: a sphere (metres)."""
-
-    sphere_radius: Positive
-    sphere_centre: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
-
-
-class MotionTable(_Table):
+class MotionTable(Table):
     """`clip` by name or AMASS file, from `start` to `end` seconds of it, stored at `fps` frames a second.
 
     `spread_arms` turns arms that sink into this body's trunk or thighs outwards, as `muslin.sim.motion.arms`
@@ -65,29 +99,23 @@ class MotionTable(_Table):
     spread_arms: bool = True
 
 
-class FabricScale(_Table):
-    """Multipliers of the fabric's density, stretch and bending stiffness."""
-
-    density: Positive = 1.0
-    stretch: Positive = 1.0
-    bend: Positive = 1.0
-
-
-class SolverTable(_Table):
-    """`dt` s: the largest time step of sequences. See `SolverSettings` and `ContactSettings` for the rest."""
+class SolverTable(Table):
+    """`dt` s: the largest time step of sequences. `max_work`: Newton iterations that a frame, or a step of a
+    drape, may take. See `SolverSettings` and `ContactSettings` for the rest."""
 
     dt: Annotated[float, Field(ge=1e-3, le=0.05)] = 1.0 / 60.0
     damping: Annotated[float, Field(ge=0.0, le=1.0)] = 2.0e-3
     drag: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
     tolerance: Annotated[float, Field(ge=1e-7, le=1e-2)] = 5.0e-4
     max_iterations: Annotated[int, Field(ge=1, le=200)] = 4
+    max_work: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
     contact_range: Annotated[float, Field(ge=5e-4, le=1e-2)] = 2.0e-3
     contact_stiffness: Positive = 1.0
     settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 150
     settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 2.0e-4
 
 
-class ExpectTable(_Table):
+class ExpectTable(Table):
     """What must hold of the result; `muslin simulate` checks it. Intersections must always be zero.
 
     At most: `largest_stretch`, the largest principal stretch in any frame, and `residual`, the force left on
@@ -105,32 +133,71 @@ class ExpectTable(_Table):
     at_rest: bool | None = None
 
 
-class Scene(_Table):
-    """One garment on one body. Without `motion` a drape at equilibrium, with it a sequence."""
+class Scene(Table):
+    """Cloth on one body, or without one among colliders and pins.
+
+    With `motion` on a body, or `sequence` without one, frames of it; otherwise a drape at equilibrium.
+    """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")] = "scene"
     garment: GarmentTable = GarmentTable()
+    layers: list[LayerTable] = Field(default=[], max_length=100)
     body: BodyTable | None = None
-    collider: ColliderTable | None = None
+    colliders: list[ColliderTable] = Field(default=[], max_length=1000)
+    pins: list[PinTable] = Field(default=[], max_length=1000)
     motion: MotionTable | None = None
-    fabric: str = "gray-interlock"
+    sequence: SequenceTable | None = None
+    fabric: FabricChoice = "gray-interlock"
     fabric_scale: FabricScale = FabricScale()
     friction_body: Share = 0.3
     friction_cloth: Share = 0.3
-    gravity: tuple[Finite, Finite, Finite] = (0.0, -9.81, 0.0)
+    gravity: Vector = (0.0, -9.81, 0.0)
+    air: AirTable | None = None
     solver: SolverTable = SolverTable()
     seed: Annotated[int, Field(ge=0)] = 0
     expect: ExpectTable = ExpectTable()
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        if self.fabric not in fabric_names():
-            raise ValueError(f"fabric = {self.fabric!r}: unknown; choose one of {', '.join(fabric_names())}")
-        if (self.body is None) == (self.collider is None):
-            raise ValueError("give exactly one of [body] and [collider]")
-        if self.motion is not None and self.body is None:
-            raise ValueError("[motion] needs a [body]")
+        for key, fabric in [("fabric", self.fabric)] + [
+            (f"layers.{k}.fabric", layer.fabric) for k, layer in enumerate(self.layers)
+        ]:
+            if isinstance(fabric, str) and ".toml" not in fabric and fabric not in fabric_names():
+                raise ValueError(
+                    f"{key} = {fabric!r}: unknown; choose one of {', '.join(fabric_names())}, or a FILE.toml"
+                )
+        if self.body is None:
+            self._check_world()
+        else:
+            self._check_worn()
         return self
+
+    def _check_worn(self) -> None:
+        for key in ("colliders", "pins", "sequence"):
+            if getattr(self, key):
+                raise ValueError(f"[{key}] is for cloth without a body; remove it or [body]")
+        for key, garment in self._garments():
+            for extra in ("position", "rotation", "repeat"):
+                if getattr(garment, extra) not in (ZERO, None):
+                    raise ValueError(f"{key}.{extra}: a garment on a [body] is put on, not placed; remove it")
+
+    def _check_world(self) -> None:
+        if self.motion is not None:
+            raise ValueError("[motion] needs a [body]; without one it is [sequence]")
+        if not self.colliders and not self.pins and self.sequence is None:
+            raise ValueError(
+                "give a [body], or [[colliders]] or [[pins]], or a [sequence] for cloth in free flight"
+            )
+        if self.sequence is not None:
+            return
+        for key in ("colliders", "pins"):
+            for k, table in enumerate(getattr(self, key)):
+                released = isinstance(table, PinTable) and table.release is not None
+                if table.moves or released:
+                    raise ValueError(f"{key}.{k} moves or lets go, which takes time: add a [sequence]")
+
+    def _garments(self) -> list[tuple[str, GarmentTable]]:
+        return [("garment", self.garment), *((f"layers.{k}", v) for k, v in enumerate(self.layers))]
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -143,22 +210,4 @@ def parse_scene(values: dict[str, Any], source: str = "scene") -> Scene:
     try:
         return Scene.model_validate(values)
     except ValidationError as error:
-        entry = error.errors()[0]
-        key = ".".join(str(part) for part in entry["loc"]) or "scene"
-        if entry["type"] == "extra_forbidden":
-            allowed = ", ".join(_allowed_keys(entry["loc"][:-1]))
-            reason = f"unknown key {key}; allowed here are {allowed}; correct or remove it"
-            raise InputError(f"{source}: {reason}") from error
-        value = entry.get("input")
-        shown = f" = {json.dumps(value, default=str)}" if entry["loc"] else ""
-        reason = entry["msg"].removeprefix("Value error, ")
-        raise InputError(f"{source}: {key}{shown}: {reason}; correct it") from error
-
-
-def _allowed_keys(location: tuple[int | str, ...]) -> list[str]:
-    model: Any = Scene
-    for part in location:
-        annotation = model.model_fields[part].annotation
-        options = [annotation, *getattr(annotation, "__args__", ())]
-        model = next(a for a in options if isinstance(a, type) and issubclass(a, BaseModel))
-    return sorted(model.model_fields)
+        raise InputError(f"{source}: {explain(error.errors()[0], Scene)}") from error

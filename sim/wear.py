@@ -1,8 +1,8 @@
-"""A garment on a parametric body: dressing, changing shape and pose, following a motion."""
+"""Garments on a parametric body: dressing, changing shape and pose, following a motion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,8 @@ from muslin.sim.body.model import BodyModel
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.clearance import SelfClearance
 from muslin.sim.contact.system import ContactSettings
-from muslin.sim.dress import LEAST_GIRTH, grow_body, place, shrunk_body
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.layers import dress
+from muslin.sim.solve.simulator import SolverSettings
 
 Tick = Callable[[], None] | None
 
@@ -35,12 +35,13 @@ def a_pose() -> NDArray[np.float64]:
 
 
 class WornGarment:
-    """A garment on a body of shape `beta`, pose `theta` and `translation`; starts dressed in the T-pose."""
+    """Garments, from inside out, on a body of shape `beta`, pose `theta` and `translation`: put on in the
+    T-pose, and one cloth from then on."""
 
     def __init__(
         self,
-        mesh: GarmentMesh,
-        cloth: ClothModel,
+        meshes: Sequence[GarmentMesh],
+        cloths: Sequence[ClothModel],
         model: BodyModel,
         beta: NDArray[np.float64],
         contact: ContactSettings,
@@ -52,12 +53,8 @@ class WornGarment:
         self.beta = beta
         self.theta = REST_POSE
         self.translation = np.zeros(3)
-        body = model.vertices(beta, REST_POSE)
-        self.clearance = SelfClearance(body, model.faces, device)
-        start = place(mesh, model, beta, body)
-        bones = shrunk_body(model, beta, body, LEAST_GIRTH)
-        self.sim = ClothSimulator(cloth, start, bones, model.faces, contact, solver, device)
-        grow_body(self.sim, model, beta, body, tick)
+        self.clearance = SelfClearance(model.vertices(beta, REST_POSE), model.faces, device)
+        self.sim = dress(meshes, cloths, model, beta, contact, solver, device, tick)
 
     def body(self) -> NDArray[np.float64]:
         """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""

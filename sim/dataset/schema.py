@@ -3,6 +3,7 @@
     ROOT/muslin.json               header: schema version, config, versions, solver digest, splits
     ROOT/index.parquet             one row a sample; a cache of what the samples say, rebuilt when missing
     ROOT/samples/ID.zarr/          one zarr 3 group a sample
+    ROOT/failed/ID.npz             last good state of a sample whose simulation could not go on
     ROOT/.partial/, ROOT/.lock     samples being written, and the lock of the process that writes
 
 Attributes of a group: `meta` (what is not an array, certificate included), `sha256` of every array's bytes (C
@@ -22,6 +23,7 @@ HEADER = "muslin.json"
 INDEX = "index.parquet"
 SAMPLES = "samples"
 PARTIAL = ".partial"
+FAILED = "failed"
 LOCK = ".lock"
 SUFFIX = ".zarr"
 

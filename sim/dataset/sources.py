@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from muslin.garments import catalogue
 from muslin.garments.pattern_file import read_pattern
 from muslin.sim.body.load import load_body
+from muslin.sim.fabric_file import is_fabric_file, read_fabric
 from muslin.sim.motion.clips import load_motion
 from muslin.sim.scene import GarmentTable, MotionTable, Scene
 
@@ -23,8 +24,12 @@ def check_sources(scenes: Iterable[Scene]) -> None:
             load_body(scene.body.model)
         if scene.motion is not None and _new(known, f"motion {scene.motion!r}"):
             _check_motion(scene.motion)
-        if _new(known, f"garment {scene.garment!r}"):
-            _check_garment(scene.garment)
+        for garment in (scene.garment, *scene.layers):
+            if _new(known, f"garment {garment!r}"):
+                _check_garment(garment)
+        choices = (scene.fabric, *(layer.fabric for layer in scene.layers))
+        for fabric in {choice for choice in choices if isinstance(choice, str) and is_fabric_file(choice)}:
+            read_fabric(fabric)
 
 
 def _new(known: set[str], key: str) -> bool:

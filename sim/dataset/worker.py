@@ -14,11 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import store
+from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.jobs import Chain, Job
 from muslin.sim.dataset.processes import leave_interrupts_to_parent
 from muslin.sim.dataset.sample import Sample
+from muslin.sim.dataset.schema import FAILED
+from muslin.sim.solve.errors import LastState, SimulationError
 
 FrameProgress = Callable[[int, int], None]
 """(work done, work in all) of one chain."""
@@ -79,17 +81,28 @@ def make_chain(task: Task) -> dict[str, str]:
             seconds = time.perf_counter() - started
             if job.id in task.missing:
                 store.write_sample(task.root, _named(job, sample, task, seconds))
+                (task.root / FAILED / f"{job.id}.npz").unlink(missing_ok=True)
                 left.remove(job)
             if not left:
                 break
             started = time.perf_counter()
     except Exception as error:  # reported for the samples it cost; the other chains are not its business
         reason = f"{type(error).__name__}: {error}"
-        if not isinstance(error, InputError) and type(error).__name__ != "SimulationError":
+        if isinstance(error, SimulationError) and error.state is not None and left:
+            reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
+        if not isinstance(error, InputError | SimulationError):
             reason += "\n" + traceback.format_exc()
         return {job.id: reason for job in left}
     _news.put((task.place, 1.0, task.chain.jobs[0].id))
     return {}
+
+
+def _keep(root: Path, sample_id: str, state: LastState) -> Path:
+    """Save the state in which a sample was given up; return the file."""
+    path = root / FAILED / f"{sample_id}.npz"
+    durable.make_folder(path.parent)
+    state.save(path)
+    return path
 
 
 def _named(job: Job, sample: Sample, task: Task, seconds: float) -> Sample:

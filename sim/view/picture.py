@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from muslin.garments.merge import face_owner
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.view.camera import Camera, frame_camera
 from muslin.sim.view.layer import FABRIC, OBSTACLE, SKIN, Layer, seam_edges
@@ -33,10 +34,21 @@ def fabric_colour(name: str) -> tuple[float, float, float]:
     return PALETTE[hashlib.sha256(name.encode()).digest()[0] % len(PALETTE)]
 
 
+def garment_colours(sample: Sample) -> np.ndarray:
+    """Colour of a sample's cloth: (3,), or (V, 3) with one of the palette for each of several garments."""
+    first = fabric_colour(sample.fabric)
+    owner = face_owner(sample.garment)
+    if not owner.any():
+        return np.array(first)
+    vertex_owner = np.zeros(sample.garment.num_vertices, dtype=np.int64)
+    vertex_owner[sample.garment.faces] = owner[:, None]
+    return np.array(PALETTE)[(PALETTE.index(first) + vertex_owner) % len(PALETTE)]
+
+
 def sample_layers(sample: Sample, frame: int = 0, colours: np.ndarray | None = None) -> list[Layer]:
     """Body (or obstacle) and garment of a frame.
 
-    colours   (V, 3) sRGB of the garment's vertices, such as a heat map; None for the colour of its fabric
+    colours   (V, 3) sRGB of the garment's vertices, such as a heat map; None for the colours of its fabrics
     """
     layers = []
     body_vertices = sample.body_vertices(frame)
@@ -48,7 +60,7 @@ def sample_layers(sample: Sample, frame: int = 0, colours: np.ndarray | None = N
         Layer(
             sample.positions[frame].astype(np.float64),
             garment.faces,
-            np.array(fabric_colour(sample.fabric)) if colours is None else colours,
+            garment_colours(sample) if colours is None else colours,
             sheet=True,
             gloss=0.02,
             seams=seam_edges(garment.faces, garment.panel_faces),

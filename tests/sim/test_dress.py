@@ -42,7 +42,7 @@ def test_dressed_without_intersections(tee, name, first):
     model = load_body(name)
     beta = betas(model, first)
     cloth = build_cloth(tee, load_fabric("gray-interlock"))
-    worn = WornGarment(tee, cloth, model, beta, ContactSettings(), SolverSettings(), "cpu")
+    worn = WornGarment([tee], [cloth], model, beta, ContactSettings(), SolverSettings(), "cpu")
     positions = worn.sim.positions
     live = np.ones(len(model.faces), bool)
     live[worn.masked_faces()] = False
@@ -118,7 +118,7 @@ def test_a_garment_that_cuts_through_the_skeleton_is_refused():
     model = load_body("female")
     cloth = build_cloth(mesh, load_fabric("gray-interlock"))
     with pytest.raises(InputError, match=r"'female' it has \d+ .* smaller garment\.edge_length"):
-        WornGarment(mesh, cloth, model, betas(model, 0.0), ContactSettings(), SolverSettings(), "cpu")
+        WornGarment([mesh], [cloth], model, betas(model, 0.0), ContactSettings(), SolverSettings(), "cpu")
 
 
 def test_sleeves_without_a_front_cannot_be_worn():

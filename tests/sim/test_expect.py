@@ -32,7 +32,7 @@ def sheet(heights: tuple[float, ...], certificate: Certificate = CERTIFICATE) ->
 
 
 def violations(expect: dict, certificate: Certificate = CERTIFICATE) -> list[str]:
-    scene = parse_scene({"collider": {"sphere_radius": 0.25}, "expect": expect})
+    scene = parse_scene({"colliders": [{"shape": "sphere", "radius": 0.25}], "expect": expect})
     return check_expectations(scene, sheet((0.5, 1.5), certificate))
 
 

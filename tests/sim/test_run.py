@@ -6,7 +6,6 @@ import pytest
 from muslin.garments import catalogue
 from muslin.garments.errors import InputError
 from muslin.garments.pattern_file import write_pattern
-from muslin.sim import run
 from muslin.sim.dataset.verify import verify_sample
 from muslin.sim.run import SimulationError, compile_kernels, cut_garment, simulate, simulate_chain
 from muslin.sim.scene import Scene, parse_scene
@@ -18,8 +17,8 @@ QUICK = {"settle_steps": 3, "dt": 0.034}
 def sphere_scene(**changes) -> Scene:
     values = {
         "name": "ball",
-        "garment": {"design": "sheet", "edge_length": 0.1},
-        "collider": {"sphere_radius": 0.2, "sphere_centre": [0.1, 0.3, -0.2]},
+        "garment": {"design": "sheet", "edge_length": 0.1, "position": [0.1, 0.508, -0.2]},
+        "colliders": [{"shape": "sphere", "radius": 0.2, "position": [0.1, 0.3, -0.2]}],
         "solver": {"settle_steps": 20},
     }
     return parse_scene(values | changes)
@@ -177,10 +176,9 @@ def test_device_that_is_not_there():
         compile_kernels("cuda:99")
 
 
-def test_simulation_error_names_scene_and_stage(monkeypatch):
-    def stuck(*_, **__):
-        raise SimulationError("the collider cannot move on")
-
-    monkeypatch.setattr(run, "settle", stuck)
-    with pytest.raises(SimulationError, match="scene ball: the collider cannot move on"):
-        simulate(sphere_scene())
+def test_a_spent_budget_names_scene_and_stage():
+    with pytest.raises(
+        SimulationError, match=r"scene ball: the budget of Newton iterations is spent"
+    ) as error:
+        simulate(sphere_scene(solver={"max_work": 2}))
+    assert error.value.state is not None

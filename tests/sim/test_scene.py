@@ -97,7 +97,25 @@ def test_bad_override(scene_file, override, says):
         ("fabric=tin", ["fabric = 'tin'", "choose one of", "gray-interlock"]),
         ("name=a/b", ['name = "a/b"', "pattern"]),
         ("motion.clip=3", ["motion.clip = 3", "string"]),
-        ("collider.sphere_radius=0.2", ["exactly one of [body] and [collider]"]),
+        ("motion={end = 1.0}", ["motion.clip is missing"]),
+        ("fabric={young = 1e6, poisson = 0.3}", ["fabric.thickness is missing"]),
+        ("fabric={young = 0}", ["fabric.young = 0", "greater than 0"]),
+        (
+            "fabric={weight = 0, young = 1, poisson = 0, thickness = 1, density = 1}",
+            ["fabric.weight", "young"],
+        ),
+        ("fabric=[3]", ["fabric = [3]", "string"]),
+        ("layers=[{fabric = 'tin'}]", ["layers.0.fabric = 'tin'", "gray-interlock", "FILE.toml"]),
+        ("layers=[{fabric = {young = -1}}]", ["layers.0.fabric.young = -1"]),
+        ("layers=[{colour = 'red'}]", ["unknown key layers.0.colour", "edge_length, fabric, fabric_scale"]),
+        ("layers=[{repeat = {count = [0, 1, 1]}}]", ["layers.0.repeat.count.0 = 0", "1"]),
+        ("garment.position=[0, 1, 0]", ["garment.position", "put on, not placed"]),
+        ("colliders=[{shape = 'plane'}]", ["[colliders] is for cloth without a body"]),
+        ("pins=[{side = 'top'}]", ["[pins] is for cloth without a body"]),
+        ("sequence.duration=1", ["[sequence] is for cloth without a body"]),
+        ("air.wind=[0, 0]", ["air.wind.2 is missing"]),
+        ("air.density=-1", ["air.density = -1"]),
+        ("solver.max_work=0", ["solver.max_work = 0", "1"]),
         ("expect.frames=0", ["expect.frames = 0", "1"]),
     ],
 )
@@ -112,11 +130,56 @@ def test_wrong_value(scene_file, override, says):
     assert "\n" not in message
 
 
-def test_no_body_and_motion_without_body():
-    with pytest.raises(InputError, match=r"exactly one of \[body\] and \[collider\]"):
-        parse_scene({})
-    with pytest.raises(InputError, match=r"\[motion\] needs a \[body\]"):
-        parse_scene({"collider": {"sphere_radius": 0.2}, "motion": {"clip": "walk"}})
+BALL = {"shape": "sphere", "radius": 0.2}
+TOP = {"side": "top"}
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({}, ["give a [body]", "[[colliders]]", "[sequence]"]),
+        ({"colliders": [BALL], "motion": {"clip": "walk"}}, ["[motion] needs a [body]", "[sequence]"]),
+        ({"colliders": [{"shape": "ball"}]}, ['colliders.0.shape = "ball"', "'sphere'", "'mesh'"]),
+        ({"colliders": [{"radius": 1.0}]}, ["colliders.0.shape", "'sphere'"]),
+        ({"colliders": [BALL | {"radius": -1.0}]}, ["colliders.0.radius = -1.0", "greater than 0"]),
+        ({"colliders": [BALL, {"shape": "cone", "radius": 1.0}]}, ["colliders.1.height is missing"]),
+        ({"colliders": [BALL | {"height": 1.0}]}, ["unknown key colliders.0.height", "position, radius"]),
+        (
+            {"colliders": [{"shape": "torus", "radius": 0.1, "rod": 0.2}]},
+            ["rod = 0.2", "less than radius = 0.1"],
+        ),
+        ({"colliders": [BALL | {"start": 1.0, "stop": 0.5}]}, ["stop = 0.5", "later than start = 1.0"]),
+        ({"colliders": [BALL | {"velocity": [0, 1, 0]}]}, ["colliders.0 moves", "[sequence]"]),
+        ({"pins": [TOP | {"release": 1.0}]}, ["pins.0 moves or lets go", "[sequence]"]),
+        ({"pins": [{}]}, ["pins.0", "exactly one of box and side"]),
+        ({"pins": [TOP | {"box": [[0, 0], [1, 1]]}]}, ["pins.0", "exactly one of box and side"]),
+        ({"pins": [{"box": [[0, 1], [1, 0]]}]}, ["box = [[0.0, 1.0], [1.0, 0.0]]", "lower corner"]),
+        ({"pins": [{"side": "front"}]}, ['pins.0.side = "front"', "'top'"]),
+        ({"sequence": {"duration": 0.0}}, ["sequence.duration = 0.0"]),
+    ],
+)
+def test_worlds_that_make_no_sense(values, says):
+    with pytest.raises(InputError) as error:
+        parse_scene(values)
+    for part in says:
+        assert part in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"colliders": [BALL, {"shape": "plane"}]},
+        {"pins": [TOP], "air": {"wind": [0.0, 0.0, 3.0]}},
+        {
+            "sequence": {"duration": 1.0},
+            "fabric": {"young": 1e6, "poisson": 0.3, "thickness": 3e-4, "density": 0.2},
+        },
+        {"body": {}, "layers": [{"preset": "short_dress", "fabric": "mine.toml:tin"}]},
+    ],
+)
+def test_a_world_survives_its_own_values(values):
+    scene = parse_scene(values)
+    assert parse_scene(scene.model_dump(mode="json")) == scene
 
 
 def test_missing_and_broken_files(tmp_path, scene_file):

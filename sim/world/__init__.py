@@ -1,0 +1,1 @@
+"""Cloth without a wearer: sheets, colliders, pins and what moves them."""
