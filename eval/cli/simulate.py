@@ -18,7 +18,8 @@ def simulate(
 ) -> None:
     """Simulate one scene and store it, with its certificate, as a dataset of one sample.
 
-    What the result violates of the scene's [expect] table is listed, and the exit code is then 1.
+    What the result violates of the scene's [expect] table is listed, and the exit code is then 1. Where the
+    simulation cannot go on, DIR.last_good.npz holds its last state without intersections.
 
     \b
     Examples:
@@ -37,9 +38,17 @@ def simulate(
     from muslin.sim.dataset.reader import write_dataset
     from muslin.sim.expect import check_expectations
     from muslin.sim.run import simulate as run
+    from muslin.sim.solve.errors import SimulationError
 
-    with progress_bar("simulate") as update:
-        sample = run(loaded, name, lambda done, total: update(done, total, ""))
+    try:
+        with progress_bar("simulate") as update:
+            sample = run(loaded, name, lambda done, total: update(done, total, ""))
+    except SimulationError as error:
+        if error.state is None:
+            raise
+        kept = out.with_name(f"{out.name}.last_good.npz")
+        error.state.save(kept)
+        raise SimulationError(f"{error}; the last good state is in {kept}", error.state) from error
     write_dataset(out, [sample], config=loaded.model_dump(mode="json"))
     found = sample.certificate
     typer.echo(
