@@ -1,7 +1,8 @@
 """Every file of scenes/ at reduced size: what it expects must hold, and so must a verification of its own.
 
 Reduced means coarse triangles, a time step a frame, three frames of motion, a drape that settles
-for a few steps only, the first and last shape of a sweep. Expectations are the file's own, but for three:
+for a few steps only, the first and last shape of a sweep; the stress set keeps its motion to the end, on
+triangles so coarse that each takes seconds. Expectations are the file's own, but for three:
 `frames` becomes the number of frames of the shortened motion. `residual` and `at_rest` tell of cloth that was
 given the time to come to rest: they are asked where the whole time was given, over a sphere. A dataset's
 expectations hold for each of its samples.
@@ -25,7 +26,11 @@ from muslin.sim.motion import load_motion, write_amass
 from muslin.sim.run import simulate_chain
 from muslin.sim.scene import ExpectTable, Scene, load_scene, parse_scene
 
-SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
+FOLDER = Path(__file__).resolve().parents[2] / "scenes"
+SCENES = sorted(FOLDER.glob("*.toml"))
+STRESS = {"ring": 0.03, "spikes": 0.03, "stack": 0.06, "twist": 0.015}
+"""Scenes of the stress set, with the edge length that they are reduced to, metres."""
+
 EDGE_LENGTH = 0.065
 SECONDS = 0.07
 SETTLE_STEPS = 6
@@ -38,9 +43,33 @@ def test_there_are_scenes() -> None:
         "cloth_on_sphere",
         "demo",
         "dress_dance",
+        "shirt_under_dress",
         "tshirt_walk",
         USERS_OWN,
     }
+    assert {path.stem for path in (FOLDER / "stress").glob("*.toml")} == set(STRESS)
+
+
+@pytest.mark.parametrize("name", STRESS)
+def test_stress_scene_ends_without_an_intersection(name: str) -> None:
+    path = FOLDER / "stress" / f"{name}.toml"
+    layers = len(load_scene(path).layers)
+    keys = ["garment.edge_length", *(f"layers.{k}.edge_length" for k in range(layers))]
+    scene = load_scene(path, [f"{key}={STRESS[name]}" for key in keys])
+    (sample,) = simulate_chain([scene])
+    assert check_expectations(scene, sample) == []
+    finding = verify_sample(sample.validate())
+    assert finding.reason == ""
+    assert (finding.cloth_cloth, finding.cloth_body, finding.frames) == (0, 0, sample.num_frames)
+
+
+def test_the_stress_scenes_do_what_they_are_named_for() -> None:
+    ring, twist = (load_scene(FOLDER / "stress" / f"{name}.toml") for name in ("ring", "twist"))
+    assert ring.sequence is not None
+    pulled = np.array(ring.pins[0].velocity) * ring.sequence.duration
+    assert -pulled[1] > 0.5 * 0.5 * np.sqrt(2.0) + 0.1, "farther than from the middle to a corner"
+    turns = np.linalg.norm(twist.pins[1].spin) * twist.pins[1].stop / (2.0 * np.pi)
+    assert turns == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
@@ -63,6 +92,7 @@ def test_scene_keeps_what_it_expects(path: Path, tmp_path: Path) -> None:
 def reduced_scene(path: Path, folder: Path) -> Scene:
     overrides = [f"garment.edge_length={EDGE_LENGTH}", f"solver.dt={TIME_STEP}"]
     full = load_scene(path)
+    overrides += [f"layers.{k}.edge_length={EDGE_LENGTH}" for k in range(len(full.layers))]
     if full.motion is not None:
         overrides += [f"motion.end={full.motion.start + SECONDS}"]
     if full.body is not None:
