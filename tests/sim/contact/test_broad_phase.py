@@ -8,7 +8,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings, ContactSystem
 from muslin.sim.material import load_fabric
 
-RANGE, MARGIN = 2e-3, 2e-3
+RANGE, MARGIN = ContactSettings().range, ContactSettings().margin
 
 
 def random_soup(count: int, seed: int, size: float = 0.02, box: float = 0.05) -> np.ndarray:
