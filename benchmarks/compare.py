@@ -23,7 +23,8 @@ MEBIBYTE = 2**20
 class Result:
     """What one contender did, a value a round: `rates` CPU seconds per simulated second; `peaks` bytes.
 
-    `frame_peaks`: CPU seconds of the slowest frame. `verdict` is of the last round.
+    `frame_peaks`: CPU seconds of the slowest frame. `verdict` is of the last round. `failure`: why it did not
+    get through the setting, and then it is run no more.
     """
 
     contender: Contender
@@ -33,6 +34,7 @@ class Result:
     versions: dict[str, str] = field(default_factory=dict)
     options: dict[str, object] = field(default_factory=dict)
     verdict: Verdict | None = None
+    failure: str | None = None
 
 
 def compare(
@@ -45,11 +47,16 @@ def compare(
     core: int,
     tell: Callable[[str], None],
 ) -> list[Result]:
-    """Run every contender once a round, on one core; results in the order of `contenders`."""
+    """Run every contender once a round, on one core; results in the order of `contenders`.
+
+    RuntimeError if muslin, which the others are measured by, does not get through; a peer's failure is noted.
+    """
     results = [Result(contender) for contender in contenders]
     setting = load_setting(setting_file, frames)
     for number in range(1, rounds + 1):
         for result in results:
+            if result.failure is not None:
+                continue
             name = result.contender.module
             folder = out / name
             command: list[str | Path] = [
@@ -59,7 +66,14 @@ def compare(
             ]
             command += [str(setting_file), str(folder), "--frames", str(setting.frames)]
             tell(f"round {number} of {rounds}: {result.contender.name}")
-            used = run(command, {core}, out / f"{name}.log")
+            try:
+                used = run(command, {core}, out / f"{name}.log")
+            except RuntimeError as error:
+                if result.contender is MUSLIN:
+                    raise
+                result.failure = str(error)
+                tell(f"  {error}")
+                continue
             record = json.loads((folder / RECORD_FILE).read_text(encoding="utf-8"))
             result.rates.append(sum(record["seconds"]) / (len(record["seconds"]) * DT))
             result.frame_peaks.append(max(record["seconds"]))
@@ -67,6 +81,8 @@ def compare(
             result.versions, result.options = record["versions"], record["options"]
             tell(f"  {result.rates[-1]:.2f} CPU s per simulated second")
     for result in results:
+        if result.failure is not None:
+            continue
         result.verdict = judge(setting, np.load(out / result.contender.module / FRAMES_FILE))
     return results
 
@@ -86,7 +102,9 @@ def table(results: list[Result]) -> str:
     lines = [f"| | {' | '.join(head)} |", "| --- |" + " --- |" * len(head)]
     for result in results:
         verdict = result.verdict
-        assert verdict is not None
+        if verdict is None:
+            lines.append(f"| {result.contender.name} | failed |" + " |" * (len(head) - 1))
+            continue
         broken = f", {verdict.broken} not finite" if verdict.broken else ""
         cells = (
             spread(result.rates).text(),
@@ -102,6 +120,8 @@ def table(results: list[Result]) -> str:
     for result in results:
         versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
         lines.append(f"- **{result.contender.name}** ({versions}). {result.contender.notes}")
+        if result.failure is not None:
+            lines.append(f"  It did not get through: {result.failure.splitlines()[-1]}")
     return "\n".join(lines) + "\n"
 
 

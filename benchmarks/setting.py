@@ -26,8 +26,8 @@ class Setting:
     `mass` (V,) kg.
     `body` (T + 1, N, 3), `body_faces` (M, 3).
     `hidden` (T + 1, M) bool: faces within the body itself, which the judge leaves out for all alike.
-    `density` kg/m^2; `stretch` (4,) N/m [c11, c12, c22, c33] and `bend` (3,) N m at rest, for hinges along
-    the warp's normal, diagonal and warp, as in `muslin.sim.material`; `friction` of cloth on body and cloth.
+    `density` kg/m^2; `stretch` (4,) N/m [c11, c12, c22, c33] and `bend` (3,) N m, of hinges along 0, 45 and
+    90 degrees to the warp, at rest, as in `muslin.sim.material`; `friction` of cloth on body and on cloth.
     """
 
     positions: NDArray[np.float64]

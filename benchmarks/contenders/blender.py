@@ -7,8 +7,8 @@ that of each vertex, M; so that accelerations come out right, stiffness is scale
 - stretch: an edge of mean length h pulls with 1000 tension (l - l0) / h. Springs of k = sqrt(3)/2 Y on
   equilateral triangles make a membrane of Young's modulus Y (Seung and Nelson 1988), here Y = c11 + c22, the
   mean of warp and weft; so tension = (sqrt(3)/2) Y h M / (1000 m). Poisson's ratio is the springs' 1/3.
-- bending: an edge turns back with 100 bending h theta, muslin's with k theta / (2 sqrt(3)) on equilateral
-  triangles.
+- bending: an edge turns back with 100 bending h theta, a hinge of the fabric's table with k theta /
+  (2 sqrt(3)) on equilateral triangles.
 - friction: a hundredth of the slip for each unit, so 100 mu on cloth and body.
 
 Rest lengths come from a shape in space: the setting's `free_positions`. Blender 5.0.1 does not heed

@@ -80,6 +80,15 @@ def test_table_has_a_row_for_each_contender() -> None:
     assert lines[0].count("|") == row.count("|")
 
 
+def test_table_tells_of_a_peer_that_failed() -> None:
+    failed = Result(CONTENDERS[2], failure="it ended with 1; the log ends:\nout of memory")
+    lines = table([result(0, [5.0], 0), failed]).splitlines()
+    row = next(line for line in lines if line.startswith(f"| {CONTENDERS[2].name}"))
+    assert "failed" in row
+    assert row.count("|") == lines[0].count("|")
+    assert lines[-1].endswith("out of memory")
+
+
 def test_contenders_are_chosen_by_name() -> None:
     assert named("newton_vbd") == (MUSLIN, CONTENDERS[3])
     with pytest.raises(ValueError, match="no contender houdini"):
