@@ -61,8 +61,8 @@ CONTENDERS = (
         "bpy",
         "Springs along edges, so no warp and weft, and Poisson's ratio 1/3; rest lengths from a shape in "
         "space that fits the panels to 0.13% (root mean square). 5 steps a frame, 2 collision passes; the "
-        "body is played from a PC2 cache under a collision modifier. The cloth starts closer to the body than "
-        "its 3 mm of collision distance; in the armpits there is room for no more.",
+        "body is played from a PC2 cache under a collision modifier. The cloth starts closer to the body "
+        "than its 3 mm of collision distance; in the armpits there is room for no more.",
     ),
     Contender(
         "newton Style3D",

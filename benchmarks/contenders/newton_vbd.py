@@ -3,7 +3,8 @@
 The membrane is a stable neo-Hookean one with Lamé parameters mu and lambda, isotropic: for small strains
 s_11 = (2 mu + lambda) G_11 + lambda G_22. The mean over warp and weft of muslin's at rest is
 mu = (c11 + c22) / 2 - c12, lambda = 2 c12. Bending is 1/2 k_e l (theta - theta_rest)^2 an edge; a hinge of
-the fabric's table, k l^2 theta^2 / (8 A), has k_e = k l / (4 A), A its two triangles' area; rest angles are zero.
+the fabric's table, k l^2 theta^2 / (8 A), has k_e = k l / (4 A), A its two triangles' area. All rest angles
+are zero.
 """
 
 from __future__ import annotations
