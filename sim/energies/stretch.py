@@ -13,6 +13,9 @@ so is not the gradient of any energy. The energy here is its work along the stra
     g^2 T(g) = I(g) = int_0^g s t(s) ds,
 
 so that pulling along any fixed direction of strain reproduces the table, and the force is W's exact gradient.
+Cloth compressed more one way than it is stretched the other is outside of what was measured; there dc fades,
+times b = S(min(1, 2 g1 / (g1 - g2))). Without that W has a kink at g1 = 0 for every g2 < 0, where wrinkled
+cloth comes to rest, and no solver can balance the forces there.
 Where both principal strains are alike, theta has no meaning: dc turns to its mean over theta with
 a = S(min(1, (g1 - g2) / g1)), which is 1 in every uniaxial test. Between the measured angles the table is
 interpolated with S(u) = u^2 (3 - 2 u): straight lines would put kinks into W at every measured angle, where
@@ -161,7 +164,13 @@ def respond(
         ratio = wp.min(one, two * r / g1)
         a = ratio * ratio * (wp.float64(3.0) - two * ratio)
         directional = low * (one - w) + high * w - average
-        dc = average + directional * a - c
+        change = average + directional * a - c
+        # g1 < r: the other principal strain is the larger one in size, and negative.
+        tension = one
+        if g1 < r:
+            tension = g1 / r
+        b = tension * tension * (wp.float64(3.0) - two * tension)
+        dc = change * b
 
         t = blend_weight(g1)
         T = blend_moment(g1) / (g1 * g1)
@@ -179,15 +188,18 @@ def respond(
             sign = one
             if angle < zero:
                 sign = -one
-            turn = sign * two * T * a * q_form((high - low) * (dw / ROW_ANGLE), g)
+            turn = sign * two * T * a * b * q_form((high - low) * (dw / ROW_ANGLE), g)
             dtheta = strainv(-g[2], g[2], two * h) * (wp.float64(0.25) / (r * r))
             blend = zero
             dr = strainv(half * h / r, -half * h / r, g[2] / r)
             da = strainv(zero, zero, zero)
             if ratio < one:
-                blend = two * T * q_form(directional, g)
+                blend = two * T * b * q_form(directional, g)
                 da = (dr - d1 * (r / g1)) * (wp.float64(6.0) * ratio * (one - ratio) * two / g1)
             total = d1 * along + dtheta * turn + da * blend
+            if tension < one:
+                fade = wp.float64(12.0) * T * tension * (one - tension) * q_form(change, g) / r
+                total += (d1 - dr * tension) * fade
             s11 += total[0]
             s22 += total[1]
             s12 += half * total[2]
