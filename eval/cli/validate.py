@@ -54,18 +54,19 @@ def validate(
     from muslin.eval.validate.report import write_report
     from muslin.eval.validate.runner import rows_of, run_cases, write_json
 
+    findings = []
     with progress_bar("validate") as update:
-        findings = run_cases(cases, update)
+        for finding in run_cases(cases, update):
+            findings.append(finding)
+            for row in rows_of(finding):
+                verdict = "pass" if row["passed"] else "FAIL"
+                unit = "" if row["unit"] == "1" else f" {row['unit']}"
+                figures = f"{number(row['measured'], 5)}{unit}, known {number(row['expected'], 5)}"
+                typer.echo(f"{verdict}  {row['name']}: {figures}")
+            if finding.error:
+                typer.echo(f"muslin: {finding.name}: {finding.error}", err=True)
     if json_file is not None:
         write_json(json_file, findings, small)
-    for finding in findings:
-        for row in rows_of(finding):
-            verdict = "pass" if row["passed"] else "FAIL"
-            unit = "" if row["unit"] == "1" else f" {row['unit']}"
-            figures = f"{number(row['measured'], 5)}{unit}, known {number(row['expected'], 5)}"
-            typer.echo(f"{verdict}  {row['name']}: {figures}")
-        if finding.error:
-            typer.echo(f"muslin: {finding.name}: {finding.error}", err=True)
     if out is not None:
         typer.echo(str(write_report(out, findings, small)))
     passed = sum(finding.passed for finding in findings)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -36,11 +36,10 @@ class Finding:
 
 def run_cases(
     cases: Sequence[LoadedCase], progress: Callable[[float, int, str], None] | None = None
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Run cases in order. One that the simulator cannot go on with is a failure, not the end of the
     others."""
     open_device("cpu")
-    findings = []
     for done, case in enumerate(cases):
         if progress is not None:
             progress(done, len(cases), case.name)
@@ -50,8 +49,7 @@ def run_cases(
         except SimulationError as stop:
             outcome, error = Outcome(), " ".join(str(stop).split())
         seconds = time.perf_counter() - started
-        findings.append(Finding(case.name, case.table.title, outcome, seconds, error))
-    return findings
+        yield Finding(case.name, case.table.title, outcome, seconds, error)
 
 
 def rows_of(finding: Finding) -> list[dict[str, Any]]:

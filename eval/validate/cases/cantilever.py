@@ -52,7 +52,7 @@ def run(p: Cantilever) -> Outcome:
             outcome.rows.append(Row(name, ratios[kind][-1], known.ratio, p.bar))
             if kind == p.triangulations[-1]:
                 shapes.append(Series(f"{kind}, {number:g}", x.tolist(), y.tolist(), "points"))
-    grid = np.geomspace(min(p.numbers), max(p.numbers), 25)
+    grid = np.geomspace(0.5 * min(p.numbers), 2.0 * max(p.numbers), 25)
     curve = Series("elastica", grid.tolist(), [heavy_elastica(float(g)).ratio for g in grid])
     points = partial(Series, style="points")
     outcome.plots = [

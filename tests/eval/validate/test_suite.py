@@ -28,7 +28,7 @@ def test_every_case_has_its_file_in_both_sizes() -> None:
 
 @pytest.mark.parametrize("case", SMALL, ids=lambda case: case.name)
 def test_case_passes_at_small_size(case: LoadedCase) -> None:
-    finding = run_cases([case])[0]
+    (finding,) = run_cases([case])
     assert not finding.error
     assert finding.outcome.rows
     assert [row for row in finding.outcome.rows if not row.passed] == []
