@@ -28,7 +28,7 @@ from muslin.sim.scene import ExpectTable, Scene, load_scene, parse_scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenes"
 SCENES = sorted(FOLDER.glob("*.toml"))
-STRESS = {"ring": (0.035, 2.0), "spikes": (0.035, 1.2), "stack": (0.13, 0.5), "twist": (0.02, 10.0)}
+STRESS = {"ring": (0.036, 2.0), "spikes": (0.035, 2.0), "stack": (0.12, 0.8), "twist": (0.03, 10.0)}
 """Scenes of the stress set: edge length, metres, and seconds that they are reduced to."""
 
 EDGE_LENGTH = 0.065

@@ -1,4 +1,4 @@
-"""A shirt under a dress: put on, at rest, in motion, and merged without loss."""
+"""A shirt under a dress: put on without a crossing, the dress outside, merged without loss."""
 
 from __future__ import annotations
 
@@ -6,23 +6,24 @@ import numpy as np
 import pytest
 import warp as wp
 
-from muslin.garments.merge import face_owner
+from muslin.garments import catalogue
 from muslin.garments.mesh import GarmentMesh
+from muslin.garments.triangulate import triangulate
 from muslin.sim.body.load import load_body
 from muslin.sim.body.skinning import bind
-from muslin.sim.cloth import build_cloth, merge_cloths
-from muslin.sim.dataset.sample import Sample
-from muslin.sim.dataset.verify import verify_sample
+from muslin.sim.cloth import ClothModel, build_cloth, merge_cloths
+from muslin.sim.contact.system import ContactSettings
+from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.elastic import ElasticEnergy
+from muslin.sim.layers import dress
 from muslin.sim.material import load_fabric
-from muslin.sim.run import simulate
-from muslin.sim.scene import parse_scene
+from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
 
 SHIRT = load_fabric("gray-interlock")
 JEANS = load_fabric("11oz-black-denim")
 
 
-def energy(cloth, x: np.ndarray) -> float:
+def energy(cloth: ClothModel, x: np.ndarray) -> float:
     out = wp.zeros(1, dtype=wp.float64)
     ElasticEnergy(cloth, "cpu").add_value(wp.array(x, dtype=wp.vec3d), 0.0, out)
     return float(out.numpy()[0])
@@ -42,44 +43,42 @@ def test_a_merged_cloth_has_the_energy_and_mass_of_its_parts(sheet_mesh: Garment
 
 
 @pytest.fixture(scope="module")
-def worn() -> Sample:
-    """A few steps into a drape."""
-    return simulate(
-        parse_scene(
-            {
-                "name": "layers",
-                "garment": {"preset": "top", "edge_length": 0.06},
-                "layers": [{"preset": "short_dress", "edge_length": 0.06, "fabric": JEANS.name}],
-                "body": {"pose": "t"},
-                "solver": {"settle_steps": 4},
-            }
-        )
+def garments() -> list[GarmentMesh]:
+    tee = catalogue.get("tee")
+    return [triangulate(tee.pattern(**tee.preset(name)), 0.06) for name in ("top", "short_dress")]
+
+
+@pytest.fixture(scope="module")
+def worn(garments: list[GarmentMesh]) -> ClothSimulator:
+    cloths = [build_cloth(mesh, fabric) for mesh, fabric in zip(garments, (SHIRT, JEANS), strict=True)]
+    model = load_body("female")
+    return dress(
+        garments, cloths, model, np.zeros(model.num_betas), ContactSettings(), SolverSettings(), "cpu"
     )
 
 
-def test_layers_do_not_cross_each_other_or_the_body(worn: Sample) -> None:
-    finding = verify_sample(worn.validate())
-    assert finding.reason == ""
-    assert (finding.cloth_cloth, finding.cloth_body) == (0, 0)
-    assert worn.fabric == "gray-interlock+11oz-black-denim"
+def test_layers_do_not_cross_each_other_or_the_body(worn: ClothSimulator) -> None:
+    body = load_body("female")
+    np.testing.assert_array_equal(worn.collider_vertices, body.vertices())
+    counts = count_intersections(worn.positions, worn.cloth.faces, worn.collider_vertices, body.faces)
+    assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)
 
 
-def test_the_dress_lies_over_the_shirt(worn: Sample) -> None:
+def test_the_dress_lies_over_the_shirt(worn: ClothSimulator, garments: list[GarmentMesh]) -> None:
     """Round the trunk, the outer layer is farther from the skin."""
-    model = load_body("female")
-    assert worn.body is not None
-    x = worn.positions[0].astype(np.float64)
-    binding = bind(x, model, worn.body.beta, worn.body.poses[0], worn.body.translations[0])
-    owner = np.zeros(len(x), int)
-    owner[worn.garment.faces] = face_owner(worn.garment)[:, None]
-    height = x[:, 1] - x[owner == 0, 1].min()
+    x = worn.positions
+    binding = bind(x, load_body("female"))
+    outer = np.arange(len(x)) >= garments[0].num_vertices
+    height = x[:, 1] - x[~outer, 1].min()
     trunk = (binding.weights[:, [0, 3, 6, 9]].sum(axis=1) > 0.9) & (height > 0.05)
-    shirt, dress = (binding.distances[trunk & (owner == k)] for k in (0, 1))
-    assert min(len(shirt), len(dress)) > 20
-    assert np.median(dress) > np.median(shirt) + 1e-3
-    assert x[owner == 1, 1].min() < x[owner == 0, 1].min() - 0.1, "the dress is the longer one"
+    inner_gap, outer_gap = (np.median(binding.distances[trunk & side]) for side in (~outer, outer))
+    assert outer_gap > inner_gap + 1e-3
+    assert x[outer, 1].min() < x[~outer, 1].min() - 0.1, "the dress is the longer one"
 
 
-def test_panels_are_named_by_their_garment(worn: Sample) -> None:
-    assert {name.partition(".")[0] for name in worn.garment.panel_names} == {"top", "short_dress"}
-    worn.garment.validate()
+def test_together_they_move_on(worn: ClothSimulator) -> None:
+    body = load_body("female")
+    report = worn.advance(body.vertices() + np.array([0.0, 0.0, 0.01]), 1.0 / 60.0)
+    assert report.splits == 0
+    counts = count_intersections(worn.positions, worn.cloth.faces, worn.collider_vertices, body.faces)
+    assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)

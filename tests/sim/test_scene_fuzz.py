@@ -128,7 +128,7 @@ def test_valid_worlds_are_read_and_written_back(values: dict[str, Any]) -> None:
     assert parse_scene(json.loads(json.dumps(scene.model_dump(mode="json")))) == scene
 
 
-@settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(values=WORLD)
 def test_valid_worlds_play_without_an_intersection_or_say_why_not(values: dict[str, Any]) -> None:
     """A start that cannot be is an InputError, a squeeze with no way out a SimulationError: nothing else."""

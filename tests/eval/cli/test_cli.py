@@ -261,6 +261,24 @@ def test_simulation_error_is_exit_code_three(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
+def test_what_cannot_go_on_leaves_its_last_good_state(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        'garment = { design = "sheet", edge_length = 0.2, position = [0.0, 0.205, 0.0] }\n'
+        'colliders = [{ shape = "sphere", radius = 0.2, subdivisions = 2 }]\n'
+        "sequence = { duration = 0.2 }\nsolver = { max_work = 3 }\n"
+    )
+    result = muslin("simulate", scene, "--out", tmp_path / "out", code=3)
+    kept = tmp_path / "out.last_good.npz"
+    assert "frame 1: the budget of Newton iterations is spent" in result.stderr
+    assert str(kept) in result.stderr.replace("\n", "")
+    assert not (tmp_path / "out").exists()
+    with np.load(kept) as state:
+        assert state["positions"].shape == state["velocity"].shape
+        assert state["faces"].max() == len(state["positions"]) - 1
+        assert state["collider_faces"].max() == len(state["collider_vertices"]) - 1
+
+
 def test_simulated_sample_is_stored(tmp_path, make_sample, monkeypatch):
     from muslin.sim import run
 

@@ -22,6 +22,7 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.config import DatasetConfig, parse_config
 from muslin.sim.dataset.sample import Sample
+from muslin.sim.solve.errors import LastState, SimulationError
 
 RADIUS = 0.3
 RIPPLE = 0.01
@@ -100,7 +101,7 @@ def make_sample(
 
 def make_scene(values: dict[str, Any]) -> dict[str, Any]:
     """The scene as it is; ValueError for what a sheet does not know, as pydantic would raise."""
-    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "die"}
+    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "stuck_at", "die"}
     if unknown:
         raise ValueError(f"unknown key {min(unknown)}")
     return values
@@ -109,7 +110,7 @@ def make_scene(values: dict[str, Any]) -> dict[str, Any]:
 def simulate(
     scenes: list[dict[str, Any]], device: str, progress: Callable[[int, int], None] | None
 ) -> Iterator[Sample]:
-    """Samples of a chain of scenes; fails at shape `fail_at`, `die` ends the process.
+    """Samples of a chain of scenes; fails at shape `fail_at`, is stuck at `stuck_at`, `die` ends the process.
 
     SHEET_DELAY s each; shapes whose beta is above SHEET_HOLD are never done.
     """
@@ -123,6 +124,10 @@ def simulate(
             time.sleep(1.0)
         if scene.get("fail_at") == beta[0]:
             raise InputError(f"cannot dress shape {beta[0]}")
+        if scene.get("stuck_at") == beta[0]:
+            here = make_sample().positions[0].astype(np.float64)
+            state = LastState(here, np.zeros_like(here), sheet().faces, ball()[0][0], ball()[1])
+            raise SimulationError("frame 3: cloth [7] is stuck", state)
         if scene.get("die"):
             os._exit(9)
         frames = 1 if "motion" not in scene else round(scene["motion"]["end"] * scene["motion"]["fps"])

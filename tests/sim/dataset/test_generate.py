@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from sheet_producer import files_of, make_scene, sheets_config, simulate
 
@@ -22,7 +23,7 @@ from muslin.sim.dataset.config import DatasetConfig, parse_config
 from muslin.sim.dataset.generate import GenerateReport, generate, solver_digest
 from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.reader import open_dataset
-from muslin.sim.dataset.schema import INDEX, PARTIAL, SAMPLES
+from muslin.sim.dataset.schema import FAILED, INDEX, PARTIAL, SAMPLES
 
 MAIN = Path(__file__).parent / "sheet_main.py"
 
@@ -102,6 +103,20 @@ def test_a_chain_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None
     assert len(report.failed) == 4
     assert set(report.failed.values()) == {"InputError: cannot dress shape -1.0"}
     assert open_dataset(tmp_path / "data").missing == tuple(report.failed)
+
+
+def test_a_chain_that_is_stuck_leaves_its_last_good_state(tmp_path: Path) -> None:
+    config = sheets_config()
+    start = config.shapes[0].sweep.start
+    report = run(parse_config(config.model_dump() | {"scene": {"stuck_at": start}}), tmp_path / "data")
+    assert (len(report.made), len(report.failed)) == (5, 4)
+    kept = tmp_path / "data" / FAILED / f"{next(iter(report.failed))}.npz"
+    assert set(report.failed.values()) == {
+        f"SimulationError: frame 3: cloth [7] is stuck; the last good state is in {kept}"
+    }
+    with np.load(kept) as state:
+        assert state["faces"].max() < len(state["positions"]) == len(state["velocity"])
+    open_dataset(tmp_path / "data")
 
 
 def test_a_worker_that_dies_is_told_with_a_remedy(tmp_path: Path) -> None:
