@@ -38,7 +38,8 @@ def merge_meshes(names: Sequence[str], meshes: Sequence[GarmentMesh]) -> Garment
             for panel in mesh.panel_names
         ),
         uv=np.concatenate([(mesh.uv + tile) / side for mesh, tile in zip(meshes, tiles, strict=True)]),
-        name="+".join(dict.fromkeys(mesh.name for mesh in meshes)),
+        # Not the name of a design, whose panels and parameters a reader would look for.
+        name="+".join(names),
         parameters={
             f"{name}{OWNER}{key}": value
             for name, mesh in zip(names, meshes, strict=True)

@@ -37,6 +37,7 @@ def test_the_parts_of_a_merged_mesh_are_the_garments(garments: list[GarmentMesh]
     np.testing.assert_allclose(merged.face_areas, np.concatenate([mesh.face_areas for mesh in garments]))
     assert len(merged.boundary_loops) == sum(len(mesh.boundary_loops) for mesh in garments)
     assert merged.parameters["sheet.width"] == 0.3
+    assert merged.name == "top+sheet+tshirt"
 
 
 def test_uv_is_tiled_without_distortion_or_overlap(garments: list[GarmentMesh]) -> None:
