@@ -11,6 +11,7 @@ import numpy as np
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.sample import Sample
+from muslin.sim.view.layer import Layer
 from muslin.sim.view.picture import sample_layers
 
 LIBRARIES = ("libGL.so.1", "libX11.so.6", "libXrender.so.1", "libXcursor.so.1")
@@ -42,6 +43,13 @@ def _loads(library: str) -> bool:
     return True
 
 
+def paint(layer: Layer) -> dict[str, Any]:
+    """The colour of a layer, one or one a vertex, as `add_mesh` takes it."""
+    if layer.colour.ndim == 1:
+        return {"color": layer.colour}
+    return {"scalars": np.rint(255.0 * layer.colour).astype(np.uint8), "rgb": True}
+
+
 def show(sample: Sample) -> None:
     """Open a window with the sample; a sequence gets a slider over its frames. Returns when it is closed."""
     require_display()
@@ -52,7 +60,7 @@ def show(sample: Sample) -> None:
     meshes = []
     for layer in sample_layers(sample, 0):
         mesh = pv.PolyData.from_regular_faces(layer.vertices, layer.faces)
-        plotter.add_mesh(mesh, color=layer.colour, smooth_shading=True, specular=layer.gloss)
+        plotter.add_mesh(mesh, **paint(layer), smooth_shading=True, specular=layer.gloss)
         meshes.append(mesh)
 
     def show_frame(value: float) -> None:

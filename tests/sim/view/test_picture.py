@@ -9,6 +9,7 @@ import trimesh
 from PIL import Image
 
 from muslin.garments.errors import InputError
+from muslin.garments.merge import merge_meshes
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.sample import Sample
@@ -17,11 +18,11 @@ from muslin.sim.view.heatmap import BAR_SPACE, colours, with_bar
 from muslin.sim.view.layer import Layer, seam_edges, vertex_normals
 from muslin.sim.view.lighting import Lights, Quality, key_directions, received
 from muslin.sim.view.movie import frame_choice, gif_bytes, write_movie
-from muslin.sim.view.picture import picture, rotation_matrix, sample_cameras
+from muslin.sim.view.picture import garment_colours, picture, rotation_matrix, sample_cameras, sample_layers
 from muslin.sim.view.rays import cast, lit_share
 from muslin.sim.view.render import render
 from muslin.sim.view.sheet import CAPTION_HEIGHT, GAP, contact_sheet
-from muslin.sim.view.window import require_display
+from muslin.sim.view.window import paint, require_display
 
 BALL = trimesh.creation.icosphere(4)
 BALL_V, BALL_F = np.array(BALL.vertices), np.array(BALL.faces)
@@ -229,6 +230,26 @@ def test_camera_walks_with_the_figure():
         p = cameras[t].project(walking.positions[t].astype(float), 120, 160)
         assert (p > 0).all()
         assert (p < [120, 160]).all()
+
+
+def test_every_garment_of_a_merged_mesh_has_a_colour_of_its_own():
+    one = sample(1)
+    n = one.garment.num_vertices
+    both = replace(
+        one,
+        garment=merge_meshes(["under", "over"], [one.garment, one.garment]),
+        positions=np.concatenate([one.positions, one.positions + np.float32([0, 1, 0])], axis=1),
+    )
+    assert garment_colours(one).shape == (3,)
+    found = garment_colours(both)
+    assert (found[:n] == garment_colours(one)).all()
+    assert (found[n:] == found[n]).all()
+    assert (found[n] != found[0]).any()
+    single, merged = (paint(sample_layers(s)[-1]) for s in (one, both))
+    assert single.keys() == {"color"}
+    assert merged["rgb"] is True
+    assert merged["scalars"].dtype == np.uint8
+    np.testing.assert_allclose(merged["scalars"] / 255.0, found, atol=0.5 / 255.0)
 
 
 def test_window_without_display_says_what_to_do(monkeypatch):
