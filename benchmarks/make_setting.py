@@ -20,7 +20,8 @@ from muslin.sim.relax import settle
 from muslin.sim.run import cut_garment
 from muslin.sim.scene import Scene, load_scene
 from muslin.sim.setting import fabric_of
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.wear import WornGarment
 
 LEAD_IN_SECONDS = 1.0

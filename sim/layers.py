@@ -21,7 +21,8 @@ from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dress import LEAST_GIRTH, grow_body, place, shrunk_body
 from muslin.sim.failure import stopped
 from muslin.sim.solve.errors import SimulationError
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 
 def dress(

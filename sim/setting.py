@@ -19,7 +19,7 @@ from muslin.sim.contact.system import ContactSettings
 from muslin.sim.fabric_file import is_fabric_file, read_fabric
 from muslin.sim.material import Fabric, isotropic_fabric, load_fabric
 from muslin.sim.scene import FabricScale, GarmentTable, IsotropicTable, LayerTable, Scene
-from muslin.sim.solve.simulator import SolverSettings
+from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.world.placing import copies
 
 

@@ -13,7 +13,7 @@ from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.clearance import SelfClearance
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.layers import dress
-from muslin.sim.solve.simulator import SolverSettings
+from muslin.sim.solve.settings import SolverSettings
 
 Tick = Callable[[], None] | None
 

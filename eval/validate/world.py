@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.solve.errors import SimulationError
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 Points = NDArray[np.float64]
 

@@ -184,6 +184,43 @@ def barrier_derivatives(
 
 
 @wp.kernel
+def guard_pairs(
+    x: wp.array(dtype=wp.vec3d),
+    p: wp.array(dtype=wp.vec3d),
+    pairs: wp.array(dtype=wp.vec4i),
+    is_edge_edge: bool,
+    measure: PairMeasure,
+    gradient: wp.array(dtype=wp.vec3d),
+    matrix: BlockMatrix,
+):
+    """Adds a spring to the Newton system for every pair that the direction p would bring together.
+
+    To first order p changes the distance d of a pair by a = n . sum_i w_i p_i. Where d + a < 0.3 d, the
+    spring k (a + d / 2)^2 / 2 asks the next direction to leave it half its distance. Vertices of the collider
+    keep their p.
+    """
+    k = wp.tid()
+    pair = pairs[k]
+    w = closest(is_edge_edge, pair, x)
+    r = difference(w, pair, x)
+    d = wp.length(r)
+    n = r / d
+    approach = wp.float64(0.0)
+    carried = wp.float64(0.0)
+    for i in range(int(0), int(4)):
+        a = w[i] * wp.dot(n, p[pair[i]])
+        approach += a
+        if pair[i] >= measure.num_cloth:
+            carried += a
+    if approach >= wp.float64(-0.7) * d:
+        return
+    area = pair_area(is_edge_edge, pair, measure)
+    spring = wp.float64(10.0) * measure.stiffness * area / (measure.range_ * measure.range_)
+    along = n * (spring * (carried + wp.float64(0.5) * d))
+    add_pair(gradient, matrix, pair, w, measure.num_cloth, along, wp.outer(n * spring, n))
+
+
+@wp.kernel
 def active_pairs(
     x: wp.array(dtype=wp.vec3d),
     reference: wp.array(dtype=wp.vec3d),

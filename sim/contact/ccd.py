@@ -2,7 +2,7 @@
 
 Conservative advancement with distances only: while a pair is at distance d, no two of its points can meet
 before the time d / l, l the sum of the largest displacements of its two sides once the common motion is taken
-away. It stops when d has shrunk to a fraction `gap` of its start, so a step never touches.
+away. It stops when d has shrunk to the fraction `GAP` of its start, so a step never touches.
 
 A step can be limited for all vertices alike (`largest_safe_step`), or for each on its own: `cut_fractions`
 lowers the fractions f of the vertices of every pair that would touch, until all pairs are safe on
@@ -19,7 +19,7 @@ from muslin.sim.contact.distance import pair_distance
 wp.set_module_options({"enable_backward": False})
 
 GAP = 0.2
-"""Fraction of the starting distance that every pair keeps in a Newton move."""
+"""Fraction of the starting distance that every pair keeps."""
 
 MAX_ADVANCES = 200
 
@@ -38,10 +38,9 @@ def advance_pair(
     m1: wp.vec3d,
     m2: wp.vec3d,
     m3: wp.vec3d,
-    gap: wp.float64,
     limit: wp.float64,
 ) -> wp.float64:
-    """Largest t up to `limit` such that a pair that moves by t m keeps `gap` of its distance all the way."""
+    """Largest t up to `limit` such that a pair that moves by t m keeps GAP of its distance all the way."""
     mean = (m0 + m1 + m2 + m3) * wp.float64(0.25)
     p0 = m0 - mean
     p1 = m1 - mean
@@ -54,6 +53,7 @@ def advance_pair(
     reach = l0 + wp.max(l1, wp.max(l2, l3))
     if is_edge_edge:
         reach = wp.max(l0, l1) + wp.max(l2, l3)
+    gap = wp.float64(GAP)
     one = wp.float64(1.0)
     d = pair_distance(is_edge_edge, x0, x1, x2, x3)
     keep = gap * d
@@ -84,15 +84,12 @@ def largest_safe_step(
     p: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
     is_edge_edge: bool,
-    gap: wp.float64,
     step: wp.array(dtype=wp.float64),
 ):
-    """step[0] = min(step[0], largest t such that the pair keeps `gap` of its distance on x + [0, t] p)."""
+    """step[0] = min(step[0], largest t such that the pair keeps GAP of its distance on x + [0, t] p)."""
     i = pairs[wp.tid()]
     a = step[0]
-    t = advance_pair(
-        is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], p[i[0]], p[i[1]], p[i[2]], p[i[3]], gap, a
-    )
+    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], p[i[0]], p[i[1]], p[i[2]], p[i[3]], a)
     if t < a:
         wp.atomic_min(step, 0, t)
 
@@ -112,7 +109,6 @@ def cut_fractions(
     pairs: wp.array(dtype=wp.vec4i),
     distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
-    gap: wp.float64,
     before: wp.array(dtype=wp.float64),
     fraction: wp.array(dtype=wp.float64),
     out: wp.array(dtype=wp.float64),
@@ -132,14 +128,14 @@ def cut_fractions(
             same += 1
     if same == 4:
         return
-    if (wp.float64(1.0) - gap) * distance[k] > way_together(is_edge_edge, i, way):
+    if (wp.float64(1.0) - wp.float64(GAP)) * distance[k] > way_together(is_edge_edge, i, way):
         return
     m0 = part_of_way(b[i[0]], p[i[0]], fraction[i[0]])
     m1 = part_of_way(b[i[1]], p[i[1]], fraction[i[1]])
     m2 = part_of_way(b[i[2]], p[i[2]], fraction[i[2]])
     m3 = part_of_way(b[i[3]], p[i[3]], fraction[i[3]])
     one = wp.float64(1.0)
-    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], m0, m1, m2, m3, gap, one)
+    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], m0, m1, m2, m3, one)
     if t < one:
         wp.atomic_add(cut, 0, 1)
         for j in range(int(0), int(4)):

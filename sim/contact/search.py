@@ -115,6 +115,9 @@ class PairSearch:
         self.body_vertices = _Elements(
             everyone[self.num_cloth :] if len(collider_faces) else everyone[:0], device
         )
+        self._cloth = [self.cloth_faces, self.cloth_edges, self.cloth_vertices]
+        self._collider = [self.body_faces, self.body_edges, self.body_vertices]
+        self._boxes_left_behind = False
         ways = Ways()
         ways.low = wp.zeros(n, dtype=wp.vec3d, device=device)
         ways.high = wp.zeros(n, dtype=wp.vec3d, device=device)
@@ -155,7 +158,10 @@ class PairSearch:
         elif hot:
             for pairs in self.lists:
                 pairs.drop_hot(self.ways.hot)
-            if not self._look(x, p, base, shift, [self.cloth_faces, self.cloth_edges, self.cloth_vertices]):
+            elsewhere = self._boxes_left_behind or shared is not None
+            if self._look(x, p, base, shift, self._cloth + (self._collider if elsewhere else [])):
+                self._boxes_left_behind = shared is not None
+            else:
                 self.search(x, p, shared, base)
 
     def search(
@@ -172,19 +178,22 @@ class PairSearch:
         args = [base, p, shift, self.num_cloth, self.budget, self.ways.way, self.travelled]
         wp.launch(spend, len(x), [*args, self.ways.hot, self._count], device=self.device)
         self.travelled.zero_()
-        moved = [self.cloth_faces, self.cloth_edges, self.cloth_vertices]
-        moved += [self.body_faces, self.body_edges, self.body_vertices]
         while True:
             wp.copy(self.ways.hot, self._whole)
             for pairs in self.lists:
                 pairs.count.zero_()
-            if self._look(x, p, base, shift, moved):
+            if self._look(x, p, base, shift, self._cloth[:2] + self._collider):
+                # Boxes that leave out a motion all have in common are not where the collider is afterwards.
+                self._boxes_left_behind = shared is not None
                 return
 
     def _look(
         self, x: wp.array, p: wp.array, base: wp.array, shift: wp.vec3d, moved: list[_Elements]
     ) -> bool:
-        """Append the pairs of hot vertices; False where a list was too short: it has grown."""
+        """Append the pairs of hot vertices; False where a list was too short: it has grown.
+
+        Boxes of primitives that have not `moved` are where they were.
+        """
         ways = self.ways
         ways.x, ways.b, ways.p = x, base, p
         wp.launch(sweep_vertices, len(x), [x, base, p, shift, ways.low, ways.high], device=self.device)
@@ -192,7 +201,8 @@ class PairSearch:
             elements.update(ways, self.searches % REBUILD_EVERY == 1)
         near, crossing = self.lists
         for vertices, first in ((self.cloth_vertices, 0), (self.body_vertices, self.num_cloth)):
-            if vertices.bvh is not None and not (first == 0 and len(moved) > 3):
+            # Cold vertices of the cloth there are only where some primitives are looked for, not all.
+            if vertices.bvh is not None and (first > 0 or vertices in moved):
                 args = [vertices.bvh.id, first, self.cloth_faces.indices]
                 self._launch(vertices_near_hot_faces, self.cloth_faces.count, args, near)
         for faces in (self.cloth_faces, self.body_faces):

@@ -14,8 +14,9 @@ from muslin.sim.contact.barrier import (
     active_pairs,
     barrier_derivatives,
     barrier_value,
+    guard_pairs,
 )
-from muslin.sim.contact.ccd import GAP, cut_fractions, go_part_of_way, largest_safe_step
+from muslin.sim.contact.ccd import cut_fractions, go_part_of_way, largest_safe_step
 from muslin.sim.contact.friction import FrictionModel, friction_derivatives, friction_value
 from muslin.sim.contact.search import PairList, PairSearch
 from muslin.sim.solve.block_matrix import BlockMatrix
@@ -78,18 +79,16 @@ class ContactSystem:
         """The pairs that may come within range."""
         return self.search.lists
 
-    def largest_step(self, x: wp.array, p: wp.array, step: wp.array, gap: float = GAP) -> float:
+    def largest_step(self, x: wp.array, p: wp.array, step: wp.array) -> float:
         """Largest t in (0, 1] at which x + t p keeps all listed pairs apart; `step` is scratch (1,)."""
         step.fill_(1.0)
         for pairs in self.lists:
             if pairs.length:
-                args = [x, p, pairs.pairs, pairs.is_edge_edge, gap, step]
+                args = [x, p, pairs.pairs, pairs.is_edge_edge, step]
                 wp.launch(largest_safe_step, pairs.length, args, device=self.device)
         return float(step.numpy()[0])
 
-    def cut_to_safety(
-        self, x: wp.array, p: wp.array, step: wp.array, base: wp.array | None = None, gap: float = GAP
-    ) -> float:
+    def cut_to_safety(self, x: wp.array, p: wp.array, step: wp.array, base: wp.array | None = None) -> float:
         """Shorten p, vertex by vertex, towards `base` (or rest) until no listed pair touches on x + p.
 
         What `MAX_CUTS` passes leave undone is up to the returned t in (0, 1]: x + t p is safe. `step` is
@@ -105,13 +104,13 @@ class ContactSystem:
             for pairs in self.lists:
                 if pairs.length:
                     args = [x, base, p, self.search.ways.way, pairs.pairs, pairs.distance, pairs.is_edge_edge]
-                    args += [gap, before, fraction, after, self._cut]
+                    args += [before, fraction, after, self._cut]
                     wp.launch(cut_fractions, pairs.length, args, device=self.device)
             if int(self._cut.numpy()[0]) == 0:
                 break
             before, fraction, after = fraction, after, before
         wp.launch(go_part_of_way, len(x), [base, p, fraction], device=self.device)
-        return 1.0 if int(self._cut.numpy()[0]) == 0 else self.largest_step(x, p, step, gap)
+        return 1.0 if int(self._cut.numpy()[0]) == 0 else self.largest_step(x, p, step)
 
     def forget_distances(self) -> None:
         """Vertices have moved: nothing is known of how far apart the pairs are."""
@@ -154,6 +153,13 @@ class ContactSystem:
         if self.num_friction:
             args = [x, start, remaining, self.friction, gradient, matrix]
             wp.launch(friction_derivatives, self.num_friction, args, device=self.device)
+
+    def add_guards(self, x: wp.array, p: wp.array, gradient: wp.array, matrix: BlockMatrix) -> None:
+        """Warn the Newton system of the pairs that its last direction p would have brought together."""
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, p, pairs.pairs, pairs.is_edge_edge, self.measure, gradient, matrix]
+                wp.launch(guard_pairs, pairs.length, args, device=self.device)
 
     def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
         """Freeze the contacts at x, which the last search must cover, for this step's friction."""

@@ -14,13 +14,11 @@ Sources: Li et al. 2020 (incremental potential contact); Gast, Schroeder 2014 (o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from muslin.sim.air import AirDrag, AirSettings
+from muslin.sim.air import AirDrag
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.carry import Carry
 from muslin.sim.contact.system import ContactSettings, ContactSystem
@@ -28,45 +26,7 @@ from muslin.sim.elastic import ElasticEnergy
 from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.inertia import quadratic_gradient, quadratic_value, step_along
 from muslin.sim.solve.linear import LinearSystem
-
-CARRY_GAP = 0.5
-"""Share of its distance that every pair keeps while cloth goes along with the collider: more of a squeeze is
-left to the energy."""
-
-
-@dataclass(frozen=True)
-class SolverSettings:
-    """`damping` s of stiffness-proportional viscosity; `drag` 1/s of mass-proportional; `tolerance` m:
-    largest Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton
-    once the collider has arrived, `max_advances` before, with `relaxations` in between where the way was
-    short; `max_move` m an iteration;
-    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`; `air`, or None for a vacuum."""
-
-    gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
-    damping: float = 2.0e-3
-    drag: float = 0.5
-    tolerance: float = 5.0e-4
-    min_iterations: int = 2
-    max_iterations: int = 4
-    max_advances: int = 30
-    relaxations: int = 2
-    max_move: float = 0.03
-    max_backtracks: int = 12
-    linear_tolerance: float = 0.1
-    max_linear_iterations: int = 400
-    max_splits: int = 4
-    air: AirSettings | None = None
-
-
-@dataclass
-class StepReport:
-    """Work of one time step: Newton and linear iterations, the last move (m), whether it met `tolerance`."""
-
-    newton: int = 0
-    linear: int = 0
-    splits: int = 0
-    last_move: float = 0.0
-    converged: bool = False
+from muslin.sim.solve.settings import SolverSettings, StepReport
 
 
 class ClothSimulator:
@@ -240,34 +200,26 @@ class ClothSimulator:
         remaining = np.where(led[:, None], goal - begin, 0.0)
         arrived = not np.abs(remaining).max(initial=0.0) > 0.0
         fraction = 1.0
-        pins_move = np.abs(remaining[:n]).max() > 0.0
+        if not arrived and self._go_along(remaining):
+            arrived = True
         iterations = advances = relaxing = 0
         while True:
             if not arrived and relaxing == 0:
-                safe = self._lead(remaining * fraction, led, dt, pins_move or self.carry is None, report)
+                safe = self._lead(remaining * fraction, led, dt, report)
                 fraction *= 1.0 - safe
                 advances += 1
                 arrived = fraction < 1e-9
                 if not arrived and advances >= s.max_advances:
                     return False
-                # What was not safe is squeezed: let it give way before the collider goes on.
-                relaxing = s.relaxations
-            self.remaining.zero_()
-            self._assemble(1.0 / dt)
-            size, limit = self._direction(remaining[led] * 0.0, led, False, report)
-            wp.copy(self.uncut, self.p)
-            safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
-            step = self._line_search(safe, 1.0 / dt)
-            if step == 0.0:
-                # Shortened here and there, the direction may not go downhill; as a whole it does.
-                wp.copy(self.p, self.uncut)
-                safe = self.contact.largest_step(self.x, self.p, self._scalar)
-                step = self._line_search(safe, 1.0 / dt)
+                # A short way means that something is squeezed: let it give way before the collider goes on.
+                relaxing = s.relaxations if safe < 0.5 and not arrived else 0
+                continue
+            size, step = self._relax(remaining[led] * 0.0, led, dt, report)
             relaxing = max(relaxing - 1, 0)
             if not arrived:
                 continue
             iterations += 1
-            report.last_move = step * limit * size
+            report.last_move = step * size
             report.converged = size < s.tolerance
             solved = report.converged and iterations >= s.min_iterations
             # A direction along which nothing can be gained would come out the same again.
@@ -276,35 +228,68 @@ class ClothSimulator:
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
         return True
 
-    def _lead(
-        self, way: NDArray[np.float64], led: NDArray[np.bool_], dt: float, by_newton: bool, report: StepReport
-    ) -> float:
+    def _go_along(self, remaining: NDArray[np.float64]) -> bool:
+        """Move the collider all of its way, and the cloth near it with it, if that squeezes nothing.
+
+        Not with pins: they pull on the cloth, and only the elastic energy knows how.
+        """
+        n = self.cloth.num_vertices
+        if self.carry is None or np.abs(remaining[:n]).max() > 0.0:
+            return False
+        self.remaining.assign(remaining)
+        self.carry.moves(self.x, self.remaining, self.target, self.base, self.p)
+        shared = self.p.numpy()[:n].mean(axis=0)
+        self.contact.search.cover(self.x, self.p, shared, self.base)
+        if self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base) < 1.0:
+            return False
+        self._move(1.0)
+        return True
+
+    def _lead(self, way: NDArray[np.float64], led: NDArray[np.bool_], dt: float, report: StepReport) -> float:
         """Move collider and pins by what is safe of their `way` (V + N, 3); returns its share.
 
-        The cloth goes along with the collider near it, or where the Newton direction takes it that knows of
-        the way: pins pull on the cloth, and only the elastic energy knows how.
+        The cloth goes where the Newton direction takes it that knows of the way.
         """
+        s = self.settings
         self.remaining.assign(way)
-        if not by_newton:
-            return self._go_along()
         self._assemble(1.0 / dt)
-        self._direction(way[led], led, True, report)
-        safe = self.contact.largest_step(self.x, self.p, self._scalar)
+        for guard in range(s.guards + 1):
+            self._direction(way[led], led, True, report)
+            safe = self.contact.largest_step(self.x, self.p, self._scalar)
+            if safe >= 0.5 or guard == s.guards:
+                break
+            self.contact.add_guards(self.x, self.p, self.gradient, self.linear.matrix)
+            if not self.linear.extras_fit():
+                break
         self._move(safe)
         return safe
 
-    def _go_along(self) -> float:
-        """Move the collider by what `remaining` tells it, and the cloth with it, as far as is safe."""
-        assert self.carry is not None
-        self.carry.moves(self.x, self.remaining, self.target, self.base, self.p)
-        shared = self.p.numpy()[: self.cloth.num_vertices].mean(axis=0)
-        self.contact.search.cover(self.x, self.p, shared, self.base)
-        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base, CARRY_GAP)
-        self._move(safe)
-        return safe
+    def _relax(
+        self, still: NDArray[np.float64], led: NDArray[np.bool_], dt: float, report: StepReport
+    ) -> tuple[float, float]:
+        """One Newton iteration with collider and pins where they are.
+
+        Returns the largest move that it asks for and the share of it that was made.
+        """
+        self.remaining.zero_()
+        self._assemble(1.0 / dt)
+        size, limit = self._direction(still, led, False, report)
+        wp.copy(self.uncut, self.p)
+        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
+        step = self._line_search(safe, 1.0 / dt)
+        if step == 0.0:
+            # Shortened here and there, the direction may not go downhill; as a whole it does.
+            wp.copy(self.p, self.uncut)
+            safe = self.contact.largest_step(self.x, self.p, self._scalar)
+            step = self._line_search(safe, 1.0 / dt)
+        return size, step * limit
 
     def _direction(
-        self, told: NDArray[np.float64], led: NDArray[np.bool_], moving: bool, report: StepReport
+        self,
+        told: NDArray[np.float64],
+        led: NDArray[np.bool_],
+        moving: bool,
+        report: StepReport,
     ) -> tuple[float, float]:
         """Solve for the next move p, `told` where `led`, and list the contacts on its way.
 

@@ -14,7 +14,8 @@ from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dress import LEAST_GIRTH, grow_body, place, shrunk_body
 from muslin.sim.material import load_fabric
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.wear import WornGarment
 
 EDGE_LENGTH = 0.06

@@ -17,7 +17,8 @@ from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.elastic import ElasticEnergy
 from muslin.sim.layers import dress
 from muslin.sim.material import load_fabric
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 SHIRT = load_fabric("gray-interlock")
 JEANS = load_fabric("11oz-black-denim")

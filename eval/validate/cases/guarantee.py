@@ -18,7 +18,8 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.material import load_fabric
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 
 class Guarantee(CaseTable):

@@ -149,6 +149,25 @@ def test_ways_that_may_end_anywhere_between_two_moves_are_covered(make_soup, clo
     assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
 
 
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_hot_vertices_find_a_collider_that_has_moved_since_the_last_search(make_soup, closest, is_edge_edge):
+    """The search before the move left out the motion that all have in common; the collider is there now."""
+    soup = make_soup(20, 20)
+    points = random_soup(40, seed=14, box=0.02)
+    common = np.array([0.1, 0.0, 0.05])
+    moves = np.tile(common, (len(points), 1))
+    soup.contact.search.search(soup.array(points), soup.array(moves), common)
+    searches = soup.contact.search.searches
+    points = points + moves
+    move = np.zeros_like(points)
+    move[:9] = [0.0, 0.01, 0.0]
+    soup.contact.search.cover(soup.array(points), soup.array(move))
+    assert soup.contact.search.searches == searches
+    wanted = near(closest, soup, [points, points + move], is_edge_edge, RANGE)
+    assert wanted
+    assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
+
+
 def test_neighbours_are_no_pairs(grid_mesh):
     """Primitives that share a vertex touch by construction."""
     mesh = grid_mesh(3, 3, 1e-3)

@@ -16,7 +16,7 @@ def safe_step(points, moves, is_edge_edge: bool, limit: float = 1.0) -> float:
     x, p = (wp.array(np.asarray(values, float), dtype=wp.vec3d, device="cpu") for values in (points, moves))
     pairs = wp.array(np.arange(4, dtype=np.int32)[None], dtype=wp.vec4i, device="cpu")
     step = wp.array([limit], dtype=wp.float64, device="cpu")
-    wp.launch(largest_safe_step, 1, [x, p, pairs, is_edge_edge, GAP, step], device="cpu")
+    wp.launch(largest_safe_step, 1, [x, p, pairs, is_edge_edge, step], device="cpu")
     return float(step.numpy()[0])
 
 

@@ -15,7 +15,8 @@ from muslin.sim.air import AirDrag, AirSettings
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.linear import LinearSystem
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 Array = NDArray[np.float64]
 GridMesh = Callable[[int, int, float], GarmentMesh]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import load_fabric
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 GridMesh = Callable[[int, int, float], GarmentMesh]
 

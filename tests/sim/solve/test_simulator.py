@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import Fabric, isotropic_fabric, load_fabric
-from muslin.sim.solve.simulator import ClothSimulator, SolverSettings
+from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.simulator import ClothSimulator
 
 Array = NDArray[np.float64]
 GridMesh = Callable[[int, int, float], GarmentMesh]
