@@ -1,12 +1,18 @@
 """Lagged Coulomb friction as a smooth dissipative potential, as Warp kernels.
 
-A contact of the start of the step, with weights w, normal n and normal force lam, slips by
-u = (I - n n^T) sum_i w_i (X_i - X_i^start), body motion included. Its potential is mu lam f0(|u|) with
-f0(y) = y outside eps and a cubic inside, so that the force mu lam f1(|u|) u / |u| is smooth:
+A contact of the start of the step, with weights w, normal n and normal force lam, is displaced by
+u = (I - n n^T) (sum_i w_i (X_i - X_i^start) + sum_i w_i s_i), body motion included. Its potential is
+mu lam f0(|u|) with f0(y) = y outside eps and a cubic inside, so that the force mu lam f1(|u|) u / |u| is
+smooth:
 
     f1(y) = 2 y / eps - (y / eps)^2 for y < eps, else 1;    f0' = f1.
 
-Source: Li et al. 2020, "Incremental potential contact", section 5.
+s_i, the bristles, are what is elastic of the displacement so far: after a step each contact's u, cut to eps,
+goes back to its vertices on the cloth as their mean by force. So cloth below the cone of friction comes to
+rest, bent by less than eps; without s it would creep. A vertex that touches nothing forgets.
+
+Sources: Li et al. 2020, "Incremental potential contact", section 5 (potential); Dahl 1968 and Cundall, Strack
+1979 (elastic displacement with a limit).
 """
 
 import warp as wp
@@ -18,12 +24,13 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class FrictionModel:
-    """Contacts of the start of the step; `slip` is eps in metres a step."""
+    """Contacts of the start of the step; `bristle` s (V,), `slip` eps, metres."""
 
     pairs: wp.array(dtype=wp.vec4i)
     weights: wp.array(dtype=wp.vec4d)
     normal: wp.array(dtype=wp.vec3d)
     force: wp.array(dtype=wp.float64)
+    bristle: wp.array(dtype=wp.vec3d)
     num_cloth: int
     cloth_body: wp.float64
     cloth_cloth: wp.float64
@@ -46,8 +53,10 @@ def slip_vector(
     w = model.weights[k]
     n = model.normal[k]
     u = wp.vec3d()
-    for i in range(4):
+    for i in range(int(0), int(4)):
         u += (x[pair[i]] - start[pair[i]]) * w[i]
+        if pair[i] < model.num_cloth:
+            u += model.bristle[pair[i]] * w[i]
     return u - n * wp.dot(n, u)
 
 
@@ -96,3 +105,44 @@ def friction_derivatives(
     along = (u + carried - n * wp.dot(n, carried)) * c
     block = (wp.identity(n=3, dtype=wp.float64) - wp.outer(n, n)) * c
     add_pair(gradient, matrix, pair, w, model.num_cloth, along, block)
+
+
+@wp.kernel
+def share_bristles(
+    x: wp.array(dtype=wp.vec3d),
+    start: wp.array(dtype=wp.vec3d),
+    model: FrictionModel,
+    total: wp.array(dtype=wp.vec3d),
+    weight: wp.array(dtype=wp.float64),
+):
+    """Adds each contact's displacement at the end of the step, cut to eps, to its vertices on the cloth.
+
+    The two sides of a contact of cloth with cloth take half of it each, in opposite directions.
+    """
+    k = wp.tid()
+    pair = model.pairs[k]
+    w = model.weights[k]
+    u = slip_vector(model, k, x, start)
+    y = wp.length(u)
+    if y > model.slip:
+        u = u * (model.slip / y)
+    sides = wp.float64(2.0)
+    for i in range(int(0), int(4)):
+        if pair[i] >= model.num_cloth:
+            sides = wp.float64(1.0)
+    for i in range(int(0), int(4)):
+        if pair[i] < model.num_cloth and w[i] != wp.float64(0.0):
+            by = model.force[k] * w[i]
+            wp.atomic_add(total, pair[i], u * (by / sides))
+            wp.atomic_add(weight, pair[i], wp.abs(by))
+
+
+@wp.kernel
+def set_bristles(
+    total: wp.array(dtype=wp.vec3d), weight: wp.array(dtype=wp.float64), bristle: wp.array(dtype=wp.vec3d)
+):
+    """bristle = total / weight, zero where there is no contact."""
+    i = wp.tid()
+    bristle[i] = wp.vec3d()
+    if weight[i] > wp.float64(0.0):
+        bristle[i] = total[i] / weight[i]

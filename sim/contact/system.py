@@ -17,7 +17,13 @@ from muslin.sim.contact.barrier import (
     guard_pairs,
 )
 from muslin.sim.contact.ccd import cut_fractions, go_part_of_way, largest_safe_step
-from muslin.sim.contact.friction import FrictionModel, friction_derivatives, friction_value
+from muslin.sim.contact.friction import (
+    FrictionModel,
+    friction_derivatives,
+    friction_value,
+    set_bristles,
+    share_bristles,
+)
 from muslin.sim.contact.search import PairList, PairSearch
 from muslin.sim.solve.block_matrix import BlockMatrix
 
@@ -25,14 +31,14 @@ from muslin.sim.solve.block_matrix import BlockMatrix
 @dataclass(frozen=True)
 class ContactSettings:
     """`range` m: distance below which the barrier acts; `margin` m that a search looks further; `stiffness`
-    J/m^2; friction coefficients; `slip_speed` m/s below which friction sticks smoothly."""
+    J/m^2; friction coefficients; `slip` m: what friction gives way before it slides."""
 
     range: float = 2.0e-3
     margin: float = 3.0e-3
     stiffness: float = 1.0
     friction_body: float = 0.3
     friction_cloth: float = 0.3
-    slip_speed: float = 5.0e-3
+    slip: float = 1.0e-4
 
 
 MAX_CUTS = 16
@@ -68,9 +74,16 @@ class ContactSystem:
 
         self.nearest = wp.zeros(1, dtype=wp.float64, device=device)
         self.friction = FrictionModel()
+        self.friction.num_cloth = self.num_cloth
+        self.friction.cloth_body = settings.friction_body
+        self.friction.cloth_cloth = settings.friction_cloth
+        self.friction.slip = settings.slip
         self.num_friction = 0
         self._fractions = [wp.zeros(n, dtype=wp.float64, device=device) for _ in range(3)]
         self._cut = wp.zeros(1, dtype=wp.int32, device=device)
+        self.friction.bristle = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
+        self._bristle_total = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
+        self._bristle_weight = wp.zeros(self.num_cloth, dtype=wp.float64, device=device)
         self._friction_count = wp.zeros(1, dtype=wp.int32, device=device)
         self._reserve_friction(8 * self.num_cloth)
 
@@ -161,15 +174,26 @@ class ContactSystem:
                 args = [x, p, pairs.pairs, pairs.is_edge_edge, self.measure, gradient, matrix]
                 wp.launch(guard_pairs, pairs.length, args, device=self.device)
 
-    def begin_step(self, x: wp.array, dt: float, friction: bool = True) -> None:
+    def begin_step(self, x: wp.array, friction: bool = True) -> None:
         """Freeze the contacts at x, which the last search must cover, for this step's friction."""
         self._list_active(x)
         if not friction:
             self.num_friction = 0
-        self.friction.num_cloth = self.num_cloth
-        self.friction.cloth_body = self.settings.friction_body
-        self.friction.cloth_cloth = self.settings.friction_cloth
-        self.friction.slip = self.settings.slip_speed * dt
+
+    def end_step(self, x: wp.array, start: wp.array) -> None:
+        """Remember what friction holds at x, the end of a step that began at `start`."""
+        self._bristle_total.zero_()
+        self._bristle_weight.zero_()
+        totals = [self._bristle_total, self._bristle_weight]
+        if self.num_friction:
+            wp.launch(
+                share_bristles, self.num_friction, [x, start, self.friction, *totals], device=self.device
+            )
+        wp.launch(set_bristles, self.num_cloth, [*totals, self.friction.bristle], device=self.device)
+
+    def forget_friction(self) -> None:
+        """Nothing has been displaced."""
+        self.friction.bristle.zero_()
 
     def smallest_distance(self, x: wp.array) -> float:
         """Smallest distance among the listed pairs, m; infinity where none is listed.

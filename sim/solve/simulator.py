@@ -141,6 +141,7 @@ class ClothSimulator:
     def place(self, positions: NDArray[np.float64], collider_vertices: NDArray[np.float64]) -> None:
         """Put cloth and collider somewhere else, at rest; they must not intersect there."""
         self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
+        self.contact.forget_friction()
 
     def restore(self, x: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
         """Put the joint vertex array (V + N, 3) and the velocities back to a saved, free state."""
@@ -193,7 +194,7 @@ class ClothSimulator:
         self.elastic.begin_step(self.x)
         if self.air is not None:
             self.air.begin_step(self.x, self.velocity if inertia else np.zeros((n, 3)))
-        self.contact.begin_step(self.x, dt, friction)
+        self.contact.begin_step(self.x, friction)
         self._set_inertia(begin[:n], dt, inertia)
         self._energy_here = None
         led = self._led()
@@ -226,6 +227,8 @@ class ClothSimulator:
             if solved or step == 0.0 or iterations >= s.max_iterations:
                 break
         self.velocity = (self.x.numpy()[:n] - begin[:n]) / dt if inertia else np.zeros((n, 3))
+        self.contact.end_step(self.x, self.start)
+        self.start.assign(self.x)
         return True
 
     def _go_along(self, remaining: NDArray[np.float64]) -> bool:

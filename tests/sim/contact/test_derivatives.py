@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from muslin.sim.contact.system import ContactSettings
+
 RANGE = 2e-3
 STEP = 1e-8
-DT = 0.01
+SLIP = ContactSettings().slip
 
 
 def crossing_triangles(seed: int) -> np.ndarray:
@@ -62,10 +64,10 @@ def test_gradient_of_friction(make_soup, case, slip, collider):
     start = CASES[case]
     soup = make_soup(2 - collider, collider, friction_body=0.4, friction_cloth=0.7)
     soup.search(start)
-    soup.contact.begin_step(soup.array(start), DT)
+    soup.contact.begin_step(soup.array(start))
     assert soup.contact.num_friction > 0
     points = start.copy()
-    points[:3] += slip * 5e-3 * DT * np.array([0.6, 0.1, -0.8])
+    points[:3] += slip * SLIP * np.array([0.6, 0.1, -0.8])
     gradient, _ = soup.derivatives(points, start)
     frozen, soup.contact.num_friction = soup.contact.num_friction, 0
     barrier, _ = soup.derivatives(points, start)
@@ -82,7 +84,7 @@ def test_hessian_is_symmetric_and_positive_semidefinite(make_soup, case, frictio
     soup = make_soup(2, 0)
     soup.search(points)
     if friction:
-        soup.contact.begin_step(soup.array(points), DT)
+        soup.contact.begin_step(soup.array(points))
     _, hessian = soup.derivatives(points + 1e-5, points)
     np.testing.assert_allclose(hessian, hessian.T, atol=1e-12 * np.abs(hessian).max())
     eigenvalues = np.linalg.eigvalsh(hessian)
@@ -146,8 +148,8 @@ def test_friction_sticks_linearly_and_saturates_at_coulombs_bound(make_soup, dir
     soup = make_soup(1, 1, friction_body=0.4)
     soup.search(points)
     normal_force = -soup.derivatives(points, points)[0][1]
-    soup.contact.begin_step(soup.array(points), DT)
-    eps = 5e-3 * DT
+    soup.contact.begin_step(soup.array(points))
+    eps = SLIP
     for share in (0.01, 0.5, 1.0, 30.0):
         moved = points.copy()
         moved[:3, direction] += share * eps
@@ -161,10 +163,10 @@ def test_friction_hessian_bounds_the_second_derivative_from_above(make_soup):
     points = point_over_triangle(1e-3)
     soup = make_soup(1, 1)
     soup.search(points)
-    soup.contact.begin_step(soup.array(points), DT)
+    soup.contact.begin_step(soup.array(points))
     for share in (1e-6, 0.5, 3.0):
         moved = points.copy()
-        moved[:3] += share * 5e-3 * DT * np.array([0.6, 0.0, 0.8])
+        moved[:3] += share * SLIP * np.array([0.6, 0.0, 0.8])
         _, hessian = soup.derivatives(moved, points)
         exact = np.zeros((3, 3))
         for axis in range(3):
@@ -185,9 +187,32 @@ def test_friction_slows_cloth_on_a_moving_collider(make_soup):
     start = point_over_triangle(1e-3)
     soup = make_soup(1, 1)
     soup.search(start)
-    soup.contact.begin_step(soup.array(start), DT)
+    soup.contact.begin_step(soup.array(start))
     together = start + np.array([1e-3, 0, 0])
     collider_alone = start.copy()
     collider_alone[3:, 0] += 1e-3
     assert abs(soup.derivatives(together, start)[0][0]) < 1e-12
     assert soup.derivatives(collider_alone, start)[0][0] < -1e-6, "drags the cloth along"
+
+
+def test_what_friction_holds_is_remembered_and_no_more_than_it_can_hold(make_soup):
+    """A patch that has slid by much keeps a displacement of `slip` against the slide, one by little all of it."""
+    for slide, kept in ((0.4 * SLIP, 0.4 * SLIP), (50.0 * SLIP, SLIP)):
+        start = point_over_triangle(1e-3)
+        soup = make_soup(1, 1)
+        soup.search(start)
+        soup.contact.begin_step(soup.array(start))
+        end = start.copy()
+        end[:3, 0] += slide
+        soup.contact.end_step(soup.array(end), soup.array(start))
+        bristles = soup.contact.friction.bristle.numpy()
+        touching = np.linalg.norm(bristles, axis=1) > 0.0
+        assert touching.any()
+        np.testing.assert_allclose(
+            bristles[touching], np.tile([kept, 0, 0], (touching.sum(), 1)), atol=1e-3 * kept
+        )
+        soup.contact.begin_step(soup.array(end))
+        assert soup.derivatives(end, end)[0][0] > 1e-7, "still holds it back where it has come to"
+        soup.contact.begin_step(soup.array(end), friction=False)
+        soup.contact.end_step(soup.array(end), soup.array(end))
+        assert not soup.contact.friction.bristle.numpy().any()
