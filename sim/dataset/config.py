@@ -64,12 +64,13 @@ class RandomDesigns(_Strict):
 
 class Design(_Strict):
     """One garment, or with `random` many: catalogue design, preset, parameters that override the preset
-    (metres)."""
+    (metres), and an edge length (metres) in place of the scene's."""
 
     name: Name | None = None
     design: str = "tee"
     preset: str | None = None
     parameters: dict[str, Finite] = {}
+    edge_length: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     random: RandomDesigns | None = None
 
 

@@ -138,7 +138,9 @@ def _designs(config: DatasetConfig) -> Iterator[_Garment]:
         name = block.name or block.preset or f"design{place}"
         drawn = list(_parameters(config, place, block))
         for k, parameters in enumerate(drawn):
-            values = {"design": block.design, "parameters": parameters}
+            values: dict[str, Any] = {"design": block.design, "parameters": parameters}
+            if block.edge_length is not None:
+                values["edge_length"] = block.edge_length
             yield _Garment(name if block.random is None else f"{name}-{k:03d}", values)
 
 

@@ -5,7 +5,7 @@ for a few steps only, the first and last shape of a sweep; the stress set goes o
 is over, on triangles so coarse that each takes seconds. Expectations are the file's own, but for three:
 `frames` becomes the number of frames of the shortened motion. `residual` and `at_rest` tell of cloth that was
 given the time to come to rest: they are asked where the whole time was given, over a sphere. A dataset's
-expectations hold for each of its samples.
+expectations hold for each of its samples. The robustness set is only planned: it is hours of work.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.dataset.verify import verify_sample
 from muslin.sim.expect import check_expectations
-from muslin.sim.motion import load_motion, write_amass
+from muslin.sim.motion import load_motion, motion_names, write_amass
 from muslin.sim.run import simulate_chain
 from muslin.sim.scene import ExpectTable, Scene, load_scene, parse_scene
+from muslin.sim.setting import cut_garment
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenes"
-SCENES = sorted(FOLDER.glob("*.toml"))
+ROBUSTNESS = FOLDER / "robustness.toml"
+SCENES = sorted(path for path in FOLDER.glob("*.toml") if path != ROBUSTNESS)
 STRESS = {"ring": (0.036, 2.0), "spikes": (0.035, 2.0), "stack": (0.12, 0.8), "twist": (0.03, 10.0)}
 """Scenes of the stress set: edge length, metres, and seconds that they are reduced to."""
 
@@ -76,6 +78,21 @@ def test_the_stress_scenes_do_what_they_are_named_for() -> None:
     assert -pulled[1] > 0.5 * 0.5 * np.sqrt(2.0) + 0.1, "farther than from the middle to a corner"
     turns = np.linalg.norm(twist.pins[1].spin) * twist.pins[1].stop / (2.0 * np.pi)
     assert turns == pytest.approx(10.0)
+
+
+def test_the_robustness_set_is_every_clip_on_every_combination() -> None:
+    jobs = plan(load_config(ROBUSTNESS)).jobs
+    scenes = [parse_scene(job.scene) for job in jobs]
+    clips = [scene.motion for scene in scenes if scene.motion is not None]
+    betas = {tuple(scene.body.beta) for scene in scenes if scene.body is not None}
+    assert len(jobs) == len(clips) == len(motion_names()) * 2 * 2 * 3
+    assert {clip.clip for clip in clips} == set(motion_names())
+    assert {(clip.start, clip.end, clip.fps) for clip in clips} == {(0.0, None, 30.0)}
+    assert len({scene.fabric for scene in scenes}) == 2
+    assert betas == {(-3.0, 0.0), (0.0, 0.0), (3.0, 0.0)}
+    for design in ("tshirt", "long_dress"):
+        first = next(parse_scene(job.scene) for job in jobs if job.labels["design"] == design)
+        assert 700 <= cut_garment(first).num_vertices <= 1000
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)

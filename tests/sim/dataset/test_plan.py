@@ -39,6 +39,7 @@ def test_ids_follow_all_that_makes_the_geometry() -> None:
     for change in (
         {"scene": {"fabric": "silk"}},
         {"designs": [{"preset": "top", "name": "a", "parameters": {"sleeve_length": 0.12}}]},
+        {"designs": [{"preset": "top", "name": "a", "edge_length": 0.03}]},
         {"fabrics": ["silk"]},
         {"scene": {"fabric": "denim", "solver": {"dt": 0.01}}},
     ):
