@@ -104,6 +104,30 @@ def growth(
 
 
 @app.command()
+def rest(
+    presets: Annotated[str, typer.Option(help="Presets of the tee.")] = "tshirt,sweater,long_dress",
+    edge_length: Annotated[float, typer.Option(help="Of the cloth, metres.")] = 0.02,
+    out: Out = OUT,
+    core: Core = 0,
+) -> None:
+    """How far drapes at the stop rule are from rest, and from those that came another way."""
+    from benchmarks.isolated import held_to
+    from benchmarks.rest import rest_figures
+
+    found = []
+    with held_to({core}):
+        for preset in presets.split(","):
+            figures = rest_figures(preset, edge_length)
+            found.append(asdict(figures))
+            rule, detour = figures.rule, figures.detour
+            typer.echo(
+                f"{preset}, {figures.vertices} vertices: mean {rule[0]:.2f}, p99 {rule[1]:.2f} mm from rest; "
+                f"by a detour {detour[0]:.2f}, {detour[1]:.2f} mm"
+            )
+    _write(out / "rest.json", found)
+
+
+@app.command()
 def workers(
     samples: Annotated[int, typer.Option(min=2, help="Drapes to make, each from the sewn start.")] = 4,
     edge_length: Annotated[float, typer.Option(help="Of the cloth, metres.")] = 0.0142,
