@@ -56,5 +56,5 @@ class AirDrag:
     def add_derivatives(
         self, x: wp.array, start: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix
     ) -> None:
-        args = [x, start, self.model, inverse_dt, gradient, matrix.values]
+        args = [x, start, self.model, inverse_dt, gradient, matrix]
         wp.launch(air_derivatives, self.num_faces, args, device=self.device)

@@ -48,24 +48,29 @@ class ClothModel:
 
     @cached_property
     def pattern(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Sorted block rows of faces, hinges and diagonal: offsets (V + 1,), columns (nnz,)."""
-        pairs = [np.stack([self.faces[:, a], self.faces[:, b]], 1) for a in range(3) for b in range(3)]
-        pairs += [np.stack([self.hinges[:, a], self.hinges[:, b]], 1) for a in range(4) for b in range(4)]
-        diagonal = np.arange(self.num_vertices, dtype=np.int32)
-        pairs.append(np.stack([diagonal, diagonal], 1))
-        keys = np.unique(np.concatenate(pairs).astype(np.int64) @ np.array([self.num_vertices, 1]))
+        """Sorted rows of the vertex pairs of faces and hinges below the diagonal: offsets (V + 1,), columns
+        (L,)."""
+        pairs = [_lower_pairs(stencils).reshape(-1, 2) for stencils in (self.faces, self.hinges)]
+        keys = np.unique(np.concatenate(pairs) @ np.array([self.num_vertices, 1]))
         rows, columns = keys // self.num_vertices, keys % self.num_vertices
         offsets = np.searchsorted(rows, np.arange(self.num_vertices + 1))
         return offsets.astype(np.int32), columns.astype(np.int32)
 
     def slots(self, stencils: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Positions in the pattern of all vertex pairs of (N, k) stencils, (N, k * k), row-major."""
+        """Positions in the pattern of the vertex pairs of (N, k) stencils, (N, k (k - 1) / 2).
+
+        In order of (1, 0), (2, 0), (2, 1), (3, 0) ... of each stencil's vertices in ascending order.
+        """
         offsets, columns = self.pattern
         n = self.num_vertices
         keys = np.repeat(np.arange(n), np.diff(offsets)).astype(np.int64) * n + columns
-        k = stencils.shape[1]
-        wanted = stencils[:, :, None].astype(np.int64) * n + stencils[:, None, :]
-        return np.searchsorted(keys, wanted.reshape(len(stencils), k * k)).astype(np.int32)
+        return np.searchsorted(keys, _lower_pairs(stencils) @ np.array([n, 1])).astype(np.int32)
+
+
+def _lower_pairs(stencils: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Vertex pairs (N, k (k - 1) / 2, 2) of (N, k) stencils, the larger vertex first."""
+    ascending = np.sort(stencils, axis=1).astype(np.int64)
+    return np.stack([ascending[:, i] for i in np.tril_indices(stencils.shape[1], -1)], axis=2)
 
 
 def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
 from muslin.sim.energies.bending import (
@@ -38,8 +39,9 @@ class ElasticEnergy:
         f64 = {"dtype": wp.float64, "device": device}
 
         stretch = StretchModel()
-        stretch.faces = wp.array(cloth.faces, dtype=wp.vec3i, device=device)
-        stretch.inverse_rest = wp.array(cloth.inverse_rest, dtype=wp.mat22d, device=device)
+        faces, inverse_rest = _ascending(cloth)
+        stretch.faces = wp.array(faces, dtype=wp.vec3i, device=device)
+        stretch.inverse_rest = wp.array(inverse_rest, dtype=wp.mat22d, device=device)
         stretch.rest_area = wp.array(cloth.rest_area, **f64)
         stretch.fabric = wp.array(cloth.face_fabric, dtype=wp.int32, device=device)
         stretch.rest = wp.array(np.stack([f.stretch_rest for f in cloth.fabrics]), **f64)
@@ -60,6 +62,7 @@ class ElasticEnergy:
         bend.moment = wp.array(np.stack(moments), dtype=wp.vec4d, device=device)
         # A cylinder of curvature k folds the table's hinges by half of it.
         bend.spacing = 2.0 * BEND_CURVATURE_STEP
+        bend.order = wp.array(np.argsort(cloth.hinges, axis=1), dtype=wp.vec4i, device=device)
         bend.slots = wp.array(cloth.slots(cloth.hinges), dtype=wp.int32, device=device)
         self.bend = bend
         state = BendState()
@@ -89,16 +92,25 @@ class ElasticEnergy:
         self, x: wp.array, inverse_dt: float, gradient: wp.array, matrix: BlockMatrix
     ) -> None:
         rate = self.damping * inverse_dt
-        stretch = [x, self.stretch, self._strain, rate, gradient, matrix.values]
+        stretch = [x, self.stretch, self._strain, rate, gradient, matrix]
         wp.launch(stretch_derivatives, self.num_faces, stretch, device=self.device)
         self._fold(x)
         bend = [self.bend, self.bend_state, self._curvature, rate]
         wp.launch(bend_torque, self.num_faces, bend, device=self.device)
-        hinges = [x, self.bend, self.bend_state, gradient, matrix.values]
+        hinges = [x, self.bend, self.bend_state, gradient, matrix]
         wp.launch(bend_derivatives, self.num_hinges, hinges, device=self.device)
 
     def _fold(self, x: wp.array) -> None:
         wp.launch(bend_angle, self.num_hinges, [x, self.bend, self.bend_state], device=self.device)
+
+
+def _ascending(cloth: ClothModel) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Faces (F, 3) with their vertices in ascending order, and `inverse_rest` (F, 2, 2) to match."""
+    b = cloth.inverse_rest
+    shape_gradients = np.concatenate([-b.sum(axis=1, keepdims=True), b], axis=1)
+    order = np.argsort(cloth.faces, axis=1)
+    faces = np.take_along_axis(cloth.faces, order, axis=1)
+    return faces, np.take_along_axis(shape_gradients, order[:, :, None], axis=1)[:, 1:]
 
 
 def principal_stretches(cloth: ClothModel, positions: np.ndarray) -> np.ndarray:

@@ -21,6 +21,8 @@ time as the friction of Li et al. 2020 is.
 
 import warp as wp
 
+from muslin.sim.solve.block_matrix import BlockMatrix
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -93,7 +95,7 @@ def air_derivatives(
     model: AirModel,
     inverse_dt: wp.float64,
     gradient: wp.array(dtype=wp.vec3d),
-    hessian: wp.array(dtype=wp.mat33d),
+    matrix: BlockMatrix,
 ):
     """Adds the gradient, N, and the Hessian blocks, N/m: exact, and positive semi-definite."""
     f = wp.tid()
@@ -108,5 +110,5 @@ def air_derivatives(
     block = block * (inverse_dt / wp.float64(9.0))
     for i in range(int(0), int(3)):
         wp.atomic_add(gradient, face[i], force)
-        for j in range(int(0), int(3)):
-            wp.atomic_add(hessian, model.slots[f, 3 * i + j], block)
+        wp.atomic_add(matrix.diagonal, face[i], block)
+        wp.atomic_add(matrix.values, model.slots[f, i], block)

@@ -26,6 +26,8 @@ Bridson, Marino, Fedkiw 2003 and Tamstorf, Grinspun 2013 (gradient of the dihedr
 
 import warp as wp
 
+from muslin.sim.solve.block_matrix import BlockMatrix
+
 wp.set_module_options({"enable_backward": False})
 
 COUPLING = wp.constant(wp.float64(1.5))
@@ -40,7 +42,8 @@ class BendModel:
     """Rest data: `hinges` (H,); `rest_area` (F,), m^2; the curvature of face f, sum of `weight` (N,), 1/m,
     times the angles of hinges `member` (N,), both from offsets[f] to offsets[f + 1]; of each `fabric` (F,),
     a row each, `rigidity` D, N m, and `moment` J, N m / m^2, at curvatures in steps of `spacing`, 1/m;
-    `slots` (H, 16) of the hinges' blocks."""
+    `order` (H,) of the hinges' vertices, ascending, and in it `slots` (H, 6) of their blocks below the
+    diagonal."""
 
     hinges: wp.array(dtype=wp.vec4i)
     rest_area: wp.array(dtype=wp.float64)
@@ -51,6 +54,7 @@ class BendModel:
     rigidity: wp.array2d(dtype=wp.vec4d)
     moment: wp.array2d(dtype=wp.vec4d)
     spacing: wp.float64
+    order: wp.array(dtype=wp.vec4i)
     slots: wp.array2d(dtype=wp.int32)
 
 
@@ -224,7 +228,7 @@ def bend_derivatives(
     model: BendModel,
     state: BendState,
     gradient: wp.array(dtype=wp.vec3d),
-    hessian: wp.array(dtype=wp.mat33d),
+    matrix: BlockMatrix,
 ):
     """Adds the gradient, N, and the positive semi-definite Hessian blocks, N/m, of the torques in `state`."""
     h = wp.tid()
@@ -232,9 +236,16 @@ def bend_derivatives(
     grad = hinge_angle_gradient(x[v[0]], x[v[1]], x[v[2]], x[v[3]])
     torque = state.torque[h]
     stiffness = state.stiffness[h]
-    for i in range(int(0), int(4)):
+    order = model.order[h]
+    slot = int(0)
+    for a in range(int(0), int(4)):
+        i = order[a]
         gi = wp.vec3d(grad[i, 0], grad[i, 1], grad[i, 2])
         wp.atomic_add(gradient, v[i], gi * torque)
-        for j in range(int(0), int(4)):
+        row = gi * stiffness
+        for b in range(int(0), a):
+            j = order[b]
             gj = wp.vec3d(grad[j, 0], grad[j, 1], grad[j, 2])
-            wp.atomic_add(hessian, model.slots[h, 4 * i + j], wp.outer(gi * stiffness, gj))
+            wp.atomic_add(matrix.values, model.slots[h, slot], wp.outer(row, gj))
+            slot += 1
+        wp.atomic_add(matrix.diagonal, v[i], wp.outer(row, gi))

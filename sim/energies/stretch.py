@@ -33,6 +33,8 @@ import math
 
 import warp as wp
 
+from muslin.sim.solve.block_matrix import BlockMatrix
+
 wp.set_module_options({"enable_backward": False})
 
 # Named, because arithmetic between literals within a kernel is done in single precision.
@@ -47,7 +49,7 @@ strainv = wp.types.vector(length=3, dtype=wp.float64)
 
 @wp.struct
 class StretchModel:
-    """Per-face rest data: see `muslin.sim.cloth.ClothModel`; one fabric a face."""
+    """Per-face rest data: see `muslin.sim.cloth.ClothModel`; vertices ascending, one fabric a face."""
 
     faces: wp.array(dtype=wp.vec3i)
     inverse_rest: wp.array(dtype=wp.mat22d)
@@ -266,7 +268,7 @@ def stretch_derivatives(
     previous: wp.array(dtype=strainv),
     damping: wp.float64,
     gradient: wp.array(dtype=wp.vec3d),
-    hessian: wp.array(dtype=wp.mat33d),
+    matrix: BlockMatrix,
 ):
     """Adds the gradient, N, and the positive semi-definite Hessian blocks, N/m."""
     f = wp.tid()
@@ -294,11 +296,12 @@ def stretch_derivatives(
     c12 = two * c[1] * area
     c22 = two * c[2] * area
     c33 = wp.float64(0.5) * c[3] * area
+    slot = int(0)
     # int(0) keeps the loops dynamic: unrolled, the kernel compiles several times longer.
     for i in range(int(0), int(3)):
         ni = shape_gradient(b, i)
         wp.atomic_add(gradient, face[i], p1 * ni[0] + p2 * ni[1])
-        for j in range(int(0), int(3)):
+        for j in range(int(0), i + 1):
             nj = shape_gradient(b, j)
             # K_ij = A (B_i^T C B_j + n_i^T S+ n_j I) with B_i = [n_i1 f1; n_i2 f2; n_i2 f1 + n_i1 f2]
             k11 = c11 * ni[0] * nj[0] + c33 * ni[1] * nj[1]
@@ -313,7 +316,11 @@ def stretch_derivatives(
             block[0, 0] = block[0, 0] + geometric
             block[1, 1] = block[1, 1] + geometric
             block[2, 2] = block[2, 2] + geometric
-            wp.atomic_add(hessian, model.slots[f, 3 * i + j], block)
+            if i == j:
+                wp.atomic_add(matrix.diagonal, face[i], block)
+            else:
+                wp.atomic_add(matrix.values, model.slots[f, slot], block)
+                slot += 1
 
 
 @wp.func

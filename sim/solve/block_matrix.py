@@ -1,7 +1,7 @@
-"""Sparse symmetric matrix of 3 x 3 blocks: a fixed pattern plus a short list of blocks outside it.
+"""Lower half of a sparse symmetric matrix of 3 x 3 blocks: a fixed pattern, and a short list outside it.
 
 The pattern holds the elastic stencils; only self-contact couples vertices beyond it, and those blocks go to a
-list, (i, j) and (j, i) both.
+list. Of (i, j) and (j, i) only the one with i > j is kept: what walks over the matrix waits for memory.
 """
 
 import warp as wp
@@ -11,7 +11,8 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class BlockMatrix:
-    """Rows `offsets` (V + 1,), `columns` (nnz,) ascending, `values` (nnz,); the list `extra_*`.
+    """Blocks `diagonal` (V,); below it rows `offsets` (V + 1,), `columns` (L,) ascending, `values` (L,); the
+    list `extra_*`.
 
     `extra_count[0]` runs on past the capacity of the list, so that the caller sees by how much it was too
     short.
@@ -20,7 +21,7 @@ class BlockMatrix:
     offsets: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)
     values: wp.array(dtype=wp.mat33d)
-    diagonal: wp.array(dtype=wp.int32)
+    diagonal: wp.array(dtype=wp.mat33d)
     extra_count: wp.array(dtype=wp.int32)
     extra_index: wp.array(dtype=wp.vec2i)
     extra_values: wp.array(dtype=wp.mat33d)
@@ -28,7 +29,7 @@ class BlockMatrix:
 
 @wp.func
 def find_slot(matrix: BlockMatrix, i: int, j: int) -> int:
-    """Position of (i, j) in the pattern, or -1."""
+    """Position of (i, j), i > j, in the pattern, or -1."""
     low = matrix.offsets[i]
     high = matrix.offsets[i + 1] - 1
     while low <= high:
@@ -45,8 +46,9 @@ def find_slot(matrix: BlockMatrix, i: int, j: int) -> int:
 
 @wp.func
 def add_block(matrix: BlockMatrix, i: int, j: int, block: wp.mat33d):
+    """Adds to block (i, j), i >= j."""
     if i == j:
-        wp.atomic_add(matrix.values, matrix.diagonal[i], block)
+        wp.atomic_add(matrix.diagonal, i, block)
     else:
         slot = find_slot(matrix, i, j)
         if slot >= 0:
@@ -68,13 +70,14 @@ def add_pair(
     force: wp.vec3d,
     block: wp.mat33d,
 ):
-    """Adds w_i `force` to the gradient and w_i w_j `block` to the matrix for vertices i, j below `count`."""
+    """Adds w_i `force` to the gradient and w_i w_j `block`, symmetric, to the matrix for vertices i, j below
+    `count`."""
     # int(0) keeps the loops dynamic: unrolled, the kernels compile several times longer.
     for i in range(int(0), int(4)):
         if pair[i] < count:
             wp.atomic_add(gradient, pair[i], force * w[i])
             for j in range(int(0), int(4)):
-                if pair[j] < count:
+                if pair[j] <= pair[i]:
                     add_block(matrix, pair[i], pair[j], block * (w[i] * w[j]))
 
 
@@ -82,13 +85,4 @@ def add_pair(
 def add_diagonal(matrix: BlockMatrix, weight: wp.array(dtype=wp.float64)):
     """Adds weight[i] I to block (i, i)."""
     i = wp.tid()
-    wp.atomic_add(matrix.values, matrix.diagonal[i], wp.identity(n=3, dtype=wp.float64) * weight[i])
-
-
-@wp.func
-def row_product(matrix: BlockMatrix, i: int, x: wp.array(dtype=wp.vec3d)) -> wp.vec3d:
-    """Row i of the pattern times x."""
-    total = wp.vec3d()
-    for k in range(matrix.offsets[i], matrix.offsets[i + 1]):
-        total += matrix.values[k] * x[matrix.columns[k]]
-    return total
+    wp.atomic_add(matrix.diagonal, i, wp.identity(n=3, dtype=wp.float64) * weight[i])

@@ -10,7 +10,7 @@ Source: Nash, Sofer 1990, "Assessing a search direction within a truncated-Newto
 
 import warp as wp
 
-from muslin.sim.solve.block_matrix import BlockMatrix, row_product
+from muslin.sim.solve.block_matrix import BlockMatrix
 from muslin.sim.solve.incomplete_cholesky import LowerFactor, apply_inverse, factorise
 
 wp.set_module_options({"enable_backward": False})
@@ -31,10 +31,19 @@ class Workspace:
 def multiply(matrix: BlockMatrix, extras: int, x: wp.array(dtype=wp.vec3d), out: wp.array(dtype=wp.vec3d)):
     """out = A x"""
     for i in range(matrix.diagonal.shape[0]):
-        out[i] = row_product(matrix, i, x)
+        xi = x[i]
+        total = matrix.diagonal[i] * xi
+        for a in range(matrix.offsets[i], matrix.offsets[i + 1]):
+            j = matrix.columns[a]
+            block = matrix.values[a]
+            total += block * x[j]
+            out[j] = out[j] + xi * block
+        out[i] = total
     for e in range(extras):
         ij = matrix.extra_index[e]
-        out[ij[0]] = out[ij[0]] + matrix.extra_values[e] * x[ij[1]]
+        block = matrix.extra_values[e]
+        out[ij[0]] = out[ij[0]] + block * x[ij[1]]
+        out[ij[1]] = out[ij[1]] + x[ij[0]] * block
 
 
 @wp.kernel
@@ -62,8 +71,7 @@ def solve_serial(
             any_fixed = 1
             p[i] = told[i]
             # As good as infinite beside any stiffness of cloth: the factor decouples the vertex.
-            k = matrix.diagonal[i]
-            matrix.values[k] = matrix.values[k] + wp.identity(n=3, dtype=wp.float64) * HELD
+            matrix.diagonal[i] = matrix.diagonal[i] + wp.identity(n=3, dtype=wp.float64) * HELD
     if any_fixed == 1:
         multiply(matrix, extras, p, work.q)
         for i in range(n):

@@ -7,7 +7,9 @@ block diagonal.
 Source: Manteuffel 1980 (shifted incomplete factorisation).
 """
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from muslin.sim.solve.block_matrix import BlockMatrix
 
@@ -19,14 +21,43 @@ MAX_SHIFT = 1.0
 
 @wp.struct
 class LowerFactor:
-    """Strictly lower rows `offsets`, `columns`, `values`, their positions `source` in the matrix; `inverse`
-    (V,) of the diagonal."""
+    """`values` (L,) below the diagonal, at the `offsets` and `columns` of the matrix, `inverse` (V,) of the
+    diagonal.
+
+    Entry a = (i, k) needs sum_c L_ic L_kc^T: `products` (P,) are the positions of the two factors, those of a
+    from product_offsets[a] to product_offsets[a + 1].
+    """
 
     offsets: wp.array(dtype=wp.int32)
     columns: wp.array(dtype=wp.int32)
-    source: wp.array(dtype=wp.int32)
+    product_offsets: wp.array(dtype=wp.int32)
+    products: wp.array(dtype=wp.vec2i)
     values: wp.array(dtype=wp.mat33d)
     inverse: wp.array(dtype=wp.mat33d)
+
+
+def factor_products(
+    offsets: NDArray[np.int32], columns: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """`product_offsets` (L + 1,) and `products` (P, 2) of a strictly lower pattern, for `LowerFactor`."""
+    n = len(offsets) - 1
+    rows = np.repeat(np.arange(n), np.diff(offsets))
+    keys = rows * n + columns
+    by_column = np.lexsort((rows, columns))
+    found = []
+    # Every two entries of one column, `apart` places of it; what they fill in counts where there is room.
+    for apart in range(1, int(np.bincount(columns, minlength=1).max(initial=0))):
+        v, u = by_column[:-apart], by_column[apart:]
+        same = columns[v] == columns[u]
+        v, u = v[same], u[same]
+        wanted = rows[u] * n + rows[v]
+        entry = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        inside = keys[entry] == wanted
+        found.append(np.stack([entry, u, v], axis=1)[inside])
+    triples = np.concatenate([np.zeros((0, 3), np.int64), *found])
+    triples = triples[np.lexsort((triples[:, 1], triples[:, 0]))]
+    starts = np.searchsorted(triples[:, 0], np.arange(len(columns) + 1))
+    return starts.astype(np.int32), triples[:, 1:].astype(np.int32)
 
 
 @wp.func
@@ -63,27 +94,14 @@ def inverse_cholesky(a: wp.mat33d) -> wp.mat33d:
 def try_factorise(matrix: BlockMatrix, factor: LowerFactor, shift: wp.float64) -> bool:
     """Fills `factor`; False at the first pivot that is not positive."""
     for i in range(factor.offsets.shape[0] - 1):
-        begin = factor.offsets[i]
-        s = matrix.values[matrix.diagonal[i]]
+        s = matrix.diagonal[i]
         s = s + wp.diag(wp.get_diag(s)) * shift
-        for a in range(begin, factor.offsets[i + 1]):
+        for a in range(factor.offsets[i], factor.offsets[i + 1]):
             k = factor.columns[a]
-            block = matrix.values[factor.source[a]]
-            # Merge of the sorted rows i and k, columns below k.
-            u = begin
-            v = factor.offsets[k]
-            v_end = factor.offsets[k + 1]
-            while u < a and v < v_end:
-                cu = factor.columns[u]
-                cv = factor.columns[v]
-                if cu == cv:
-                    block -= factor.values[u] * wp.transpose(factor.values[v])
-                    u = u + 1
-                    v = v + 1
-                elif cu < cv:
-                    u = u + 1
-                else:
-                    v = v + 1
+            block = matrix.values[a]
+            for b in range(factor.product_offsets[a], factor.product_offsets[a + 1]):
+                uv = factor.products[b]
+                block -= factor.values[uv[0]] * wp.transpose(factor.values[uv[1]])
             l = block * wp.transpose(factor.inverse[k])
             factor.values[a] = l
             s -= l * wp.transpose(l)
@@ -103,7 +121,7 @@ def factorise(matrix: BlockMatrix, factor: LowerFactor, shift: wp.float64) -> wp
             return s
         s = s * wp.float64(4.0)
     for i in range(factor.offsets.shape[0] - 1):
-        factor.inverse[i] = inverse_cholesky(matrix.values[matrix.diagonal[i]])
+        factor.inverse[i] = inverse_cholesky(matrix.diagonal[i])
         for a in range(factor.offsets[i], factor.offsets[i + 1]):
             factor.values[a] = wp.mat33d()
     return s
@@ -120,7 +138,7 @@ def apply_inverse(factor: LowerFactor, r: wp.array(dtype=wp.vec3d), z: wp.array(
         z[i] = factor.inverse[i] * s
     for j in range(n):
         i = n - 1 - j
-        s = wp.transpose(factor.inverse[i]) * z[i]
+        s = z[i] * factor.inverse[i]
         z[i] = s
         for a in range(factor.offsets[i], factor.offsets[i + 1]):
-            z[factor.columns[a]] = z[factor.columns[a]] - wp.transpose(factor.values[a]) * s
+            z[factor.columns[a]] = z[factor.columns[a]] - s * factor.values[a]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from muslin.sim.cloth import ClothModel
 from muslin.sim.solve.block_matrix import BlockMatrix, add_diagonal
 from muslin.sim.solve.conjugate_gradients import Workspace, solve_serial
-from muslin.sim.solve.incomplete_cholesky import MAX_SHIFT, LowerFactor
+from muslin.sim.solve.incomplete_cholesky import MAX_SHIFT, LowerFactor, factor_products
 from muslin.sim.solve.parallel_gradients import solve_parallel
 
 
@@ -26,22 +26,22 @@ class LinearSystem:
         self.parallel = wp.get_device(device).is_cuda if parallel is None else parallel
         n = cloth.num_vertices
         offsets, columns = cloth.pattern
-        rows = np.repeat(np.arange(n), np.diff(offsets))
         m = BlockMatrix()
         m.offsets = wp.array(offsets, dtype=wp.int32, device=device)
         m.columns = wp.array(columns, dtype=wp.int32, device=device)
         m.values = wp.zeros(len(columns), dtype=wp.mat33d, device=device)
-        m.diagonal = wp.array(np.flatnonzero(rows == columns), dtype=wp.int32, device=device)
+        m.diagonal = wp.zeros(n, dtype=wp.mat33d, device=device)
         m.extra_count = wp.zeros(1, dtype=wp.int32, device=device)
         self.matrix = m
         self._reserve_extras(16 * n)
 
-        lower = np.flatnonzero(columns < rows)
         f = LowerFactor()
-        f.offsets = wp.array(np.searchsorted(rows[lower], np.arange(n + 1)), dtype=wp.int32, device=device)
-        f.columns = wp.array(columns[lower], dtype=wp.int32, device=device)
-        f.source = wp.array(lower, dtype=wp.int32, device=device)
-        f.values = wp.zeros(len(lower), dtype=wp.mat33d, device=device)
+        f.offsets = m.offsets
+        f.columns = m.columns
+        product_offsets, products = factor_products(offsets, columns)
+        f.product_offsets = wp.array(product_offsets, dtype=wp.int32, device=device)
+        f.products = wp.array(products, dtype=wp.vec2i, device=device)
+        f.values = wp.zeros(len(columns), dtype=wp.mat33d, device=device)
         f.inverse = wp.zeros(n, dtype=wp.mat33d, device=device)
         self.factor = f
         self.smallest_shift = shift
@@ -56,6 +56,7 @@ class LinearSystem:
         self.scalars = wp.zeros(5, dtype=wp.float64, device=device)
 
     def clear(self) -> None:
+        self.matrix.diagonal.zero_()
         self.matrix.values.zero_()
         self.matrix.extra_count.zero_()
 

@@ -8,7 +8,7 @@ vary from run to run.
 
 import warp as wp
 
-from muslin.sim.solve.block_matrix import BlockMatrix, row_product
+from muslin.sim.solve.block_matrix import BlockMatrix
 from muslin.sim.solve.conjugate_gradients import Workspace
 
 wp.set_module_options({"enable_backward": False})
@@ -31,7 +31,7 @@ def begin(
     i = wp.tid()
     inverse[i] = wp.mat33d()
     if fixed[i] == 0:
-        inverse[i] = wp.inverse(matrix.values[matrix.diagonal[i]])
+        inverse[i] = wp.inverse(matrix.diagonal[i])
     r = -gradient[i] - work.q[i]
     z = inverse[i] * r
     work.r[i] = r
@@ -56,9 +56,16 @@ def tell(
 
 @wp.kernel
 def multiply(matrix: BlockMatrix, work: Workspace):
-    """q = A d, the part in the pattern."""
+    """q += A d, the part in the pattern."""
     i = wp.tid()
-    work.q[i] = row_product(matrix, i, work.d)
+    d = work.d[i]
+    total = matrix.diagonal[i] * d
+    for a in range(matrix.offsets[i], matrix.offsets[i + 1]):
+        j = matrix.columns[a]
+        block = matrix.values[a]
+        total += block * work.d[j]
+        wp.atomic_add(work.q, j, d * block)
+    wp.atomic_add(work.q, i, total)
 
 
 @wp.kernel
@@ -67,7 +74,9 @@ def multiply_extras(matrix: BlockMatrix, work: Workspace):
     e = wp.tid()
     if e < matrix.extra_count[0]:
         ij = matrix.extra_index[e]
-        wp.atomic_add(work.q, ij[0], matrix.extra_values[e] * work.d[ij[1]])
+        block = matrix.extra_values[e]
+        wp.atomic_add(work.q, ij[0], block * work.d[ij[1]])
+        wp.atomic_add(work.q, ij[1], work.d[ij[0]] * block)
 
 
 @wp.kernel
@@ -137,10 +146,12 @@ def solve_parallel(
     n = len(gradient)
     scalars.zero_()
     wp.launch(tell, n, [fixed, told, p, work], device=device)
+    work.q.zero_()
     wp.launch(multiply, n, [matrix, work], device=device)
     wp.launch(multiply_extras, len(matrix.extra_index), [matrix, work], device=device)
     wp.launch(begin, n, [matrix, fixed, gradient, work, inverse, scalars], device=device)
     for iteration in range(1, max_iterations + 1):
+        work.q.zero_()
         wp.launch(multiply, n, [matrix, work], device=device)
         wp.launch(multiply_extras, len(matrix.extra_index), [matrix, work], device=device)
         wp.launch(curvature, n, [work, scalars], device=device)

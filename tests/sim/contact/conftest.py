@@ -12,6 +12,7 @@ from muslin.sim.contact.distance import pair_difference, pair_weights
 from muslin.sim.contact.system import ContactSettings, ContactSystem
 from muslin.sim.material import load_fabric
 from muslin.sim.solve.linear import LinearSystem
+from tests.sim.dense import dense
 
 
 @wp.kernel
@@ -79,17 +80,7 @@ class Soup:
             arrays = [self.array(values) for values in (points, start, remaining)]
             self.contact.add_derivatives(*arrays, gradient, self.linear.matrix)
             if self.linear.extras_fit():
-                return gradient.numpy().ravel(), self._dense()
-
-    def _dense(self) -> np.ndarray:
-        m = self.linear.matrix
-        dense = np.zeros((self.num_cloth, self.num_cloth, 3, 3))
-        rows = np.repeat(np.arange(self.num_cloth), np.diff(m.offsets.numpy()))
-        dense[rows, m.columns.numpy()] = m.values.numpy()
-        count = int(m.extra_count.numpy()[0])
-        i, j = m.extra_index.numpy()[:count].T
-        np.add.at(dense, (i, j), m.extra_values.numpy()[:count])
-        return dense.transpose(0, 2, 1, 3).reshape(3 * self.num_cloth, 3 * self.num_cloth)
+                return gradient.numpy().ravel(), dense(self.linear.matrix)
 
 
 @pytest.fixture

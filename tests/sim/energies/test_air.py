@@ -17,6 +17,7 @@ from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.linear import LinearSystem
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
+from tests.sim.dense import dense
 
 Array = NDArray[np.float64]
 GridMesh = Callable[[int, int, float], GarmentMesh]
@@ -48,15 +49,11 @@ class Blown:
 
     def derivatives(self, x: Array) -> tuple[Array, Array]:
         """Gradient (V, 3) and dense Hessian (3 V, 3 V)."""
-        n = len(x)
-        gradient = wp.zeros(n, dtype=wp.vec3d)
+        gradient = wp.zeros(len(x), dtype=wp.vec3d)
         self.linear.clear()
         matrix = self.linear.matrix
         self.air.add_derivatives(wp.array(x, dtype=wp.vec3d), self._start, 1.0 / DT, gradient, matrix)
-        offsets, columns = self.cloth.pattern
-        dense = np.zeros((n, n, 3, 3))
-        dense[np.repeat(np.arange(n), np.diff(offsets)), columns] = matrix.values.numpy()
-        return gradient.numpy(), dense.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+        return gradient.numpy(), dense(matrix)
 
 
 @pytest.fixture

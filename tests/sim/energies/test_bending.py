@@ -23,6 +23,7 @@ from muslin.sim.energies.bending import (
 from muslin.sim.material import Fabric, fabric_names, isotropic_fabric, load_fabric
 from muslin.sim.solve.linear import LinearSystem
 from tests.sim.conftest import make_flat_mesh
+from tests.sim.dense import dense
 from tests.sim.meshes import KINDS, sheet
 
 Array = NDArray[np.float64]
@@ -64,17 +65,13 @@ class Bending:
 
     def derivatives(self, x: Array, damping: float = 0.0) -> tuple[Array, Array]:
         """Gradient (V, 3) and dense Hessian (3 V, 3 V)."""
-        n = self.cloth.num_vertices
-        gradient = wp.zeros(n, dtype=wp.vec3d)
+        gradient = wp.zeros(self.cloth.num_vertices, dtype=wp.vec3d)
         self.linear.clear()
         self._fold(x)
         wp.launch(bend_torque, len(self.cloth.faces), [self.model, self.state, self.previous, damping])
         inputs = [wp.array(x, dtype=wp.vec3d), self.model, self.state, gradient]
-        wp.launch(bend_derivatives, len(self.cloth.hinges), [*inputs, self.linear.matrix.values])
-        offsets, columns = self.cloth.pattern
-        dense = np.zeros((n, n, 3, 3))
-        dense[np.repeat(np.arange(n), np.diff(offsets)), columns] = self.linear.matrix.values.numpy()
-        return gradient.numpy(), dense.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+        wp.launch(bend_derivatives, len(self.cloth.hinges), [*inputs, self.linear.matrix])
+        return gradient.numpy(), dense(self.linear.matrix)
 
     def gradient_by_differences(self, x: Array, damping: float = 0.0, h: float = 1e-8) -> Array:
         steps = h * np.eye(x.size).reshape(x.size, *x.shape)

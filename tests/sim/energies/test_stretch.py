@@ -15,6 +15,7 @@ from muslin.sim.elastic import ElasticEnergy
 from muslin.sim.energies.stretch import blend_moment, respond, strainv
 from muslin.sim.material import Fabric, fabric_names, isotropic_fabric, load_fabric
 from muslin.sim.solve.linear import LinearSystem
+from tests.sim.dense import dense
 
 Array = NDArray[np.float64]
 
@@ -256,9 +257,7 @@ class Triangle:
         gradient = wp.zeros(3, dtype=wp.vec3d)
         self.linear.clear()
         self.elastic.add_derivatives(wp.array(x, dtype=wp.vec3d), inverse_dt, gradient, self.linear.matrix)
-        # All vertices are coupled: the pattern is the full 3 x 3.
-        blocks = self.linear.matrix.values.numpy().reshape(3, 3, 3, 3)
-        return gradient.numpy(), blocks.transpose(0, 2, 1, 3).reshape(9, 9)
+        return gradient.numpy(), dense(self.linear.matrix)
 
     def gradient_by_differences(self, x: Array, inverse_dt: float = 0.0, h: float = 1e-8) -> Array:
         steps = h * np.eye(9).reshape(9, 3, 3)
