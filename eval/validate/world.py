@@ -101,7 +101,7 @@ def level(panel: Points, height: float = 0.0) -> Points:
 
 def contact_forces(sim: ClothSimulator) -> Points:
     """(V, 3) forces of all contacts, with cloth and collider, on the cloth's vertices, N; no friction."""
-    sim.contact.begin_step(sim.x, 1.0, False)
+    sim.contact.begin_step(sim.x, friction=False)
     sim.start.assign(sim.x)
     sim.remaining.zero_()
     sim.gradient.zero_()
