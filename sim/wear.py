@@ -62,7 +62,7 @@ class WornGarment:
 
     def _collider(self) -> NDArray[np.float64]:
         """What the cloth must meet where the body now stands."""
-        return self.clearance.collider(self.body(), self.sim.positions)
+        return self.clearance.collider(self.body(), self.sim.positions, self.sim.collider_vertices)
 
     def masked_faces(self) -> NDArray[np.int32]:
         """Faces on which the collider, as it stands, differs from the body."""

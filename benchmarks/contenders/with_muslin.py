@@ -24,7 +24,7 @@ def simulate(setting: Setting) -> Record:
     record.options = {"max_iterations": solver.max_iterations, "contact_range": contact.range}
     for body in setting.body[1:]:
         with record.frame():
-            sim.advance(clearance.collider(body, sim.positions), DT)
+            sim.advance(clearance.collider(body, sim.positions, sim.collider_vertices), DT)
         record.add(sim.positions)
     return record
 

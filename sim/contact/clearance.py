@@ -93,18 +93,26 @@ class SelfClearance:
         degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
         self._average = degree @ adjacency
 
-    def collider(self, vertices: NDArray[np.float64], cloth: NDArray[np.float64]) -> NDArray[np.float64]:
+    def collider(
+        self,
+        vertices: NDArray[np.float64],
+        cloth: NDArray[np.float64],
+        standing: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
         """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
 
         A vertex moves only if there is cloth near it, and if every face around it passes
         `masked_face_is_interior`: so the faces on which collider and body differ are fit to be masked.
+        `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
+        that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
         """
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals)
         inwards = np.where(free < 0.0, 0.5 * ROOM - free, 0.5 * np.maximum(ROOM - free, 0.0))
         moved = inwards > 0.0
         crowded = np.flatnonzero(moved)
-        distance, _ = cKDTree(cloth).query(vertices[crowded], distance_upper_bound=NEAR_CLOTH)
+        beside = vertices if standing is None else standing
+        distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=NEAR_CLOTH)
         moved[crowded[~np.isfinite(distance)]] = False
         faces = np.flatnonzero(moved[self.faces].any(axis=1))
         if len(faces) == 0:

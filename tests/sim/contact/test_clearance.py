@@ -68,6 +68,15 @@ def test_without_cloth_nearby_the_collider_is_the_body(gap):
     assert collider.tobytes() == vertices.tobytes()
 
 
+def test_cloth_that_a_moving_body_has_yet_to_carry_along_counts_as_near():
+    vertices, faces = two_spheres(-0.01)
+    clearance = SelfClearance(vertices, faces, "cpu")
+    way = np.array([0.0, 0.5, 0.0])
+    carried = clearance.collider(vertices + way, CLOTH, vertices)
+    np.testing.assert_allclose(carried - way, clearance.collider(vertices, CLOTH), atol=1e-6)
+    assert np.abs(carried - vertices - way).max() > 0.5 * ROOM
+
+
 @pytest.mark.parametrize("gap", [0.0, -0.002, -0.01, -0.03])
 def test_masked_faces_pass_the_test_of_the_verification(gap):
     vertices, faces = two_spheres(gap)
