@@ -1,12 +1,12 @@
-"""Coming to rest: steps with kinetic damping until the swing is over, then ever longer steps without inertia.
+"""Coming to rest: kinetic damping until the swing is over, then ever longer steps without inertia.
 
 Velocities are set to zero whenever the kinetic energy has passed a peak (Barnes 1999, "Form finding and
 analysis of tension structures by dynamic relaxation"). That alone ends anywhere: after each such moment the
-cloth starts again from nothing, and moves of a step, some dt^2 times the acceleration, are small however far
-it has to go. So the length of a step, then without inertia, is doubled up to `LONGEST`, where a step is all but
-the equilibrium itself (pseudo-transient continuation; Kelley, Keyes 1998), and cloth is at rest when such steps
-no longer move it. A force residual alone misleads as well: cloth that slides along a soft curved valley shows
-little force a centimetre from where it ends. The report holds both.
+cloth starts again from nothing, and its moves in a step, some dt^2 times the acceleration, are small however
+far it has to go. So steps are then without inertia and twice as long each, up to `LONGEST`, where a step is
+all but the equilibrium itself (pseudo-transient continuation; Kelley, Keyes 1998). Cloth is at rest when such
+steps no longer move it. A force residual alone misleads as well: cloth that slides along a soft curved valley
+shows little force a centimetre from where it ends. The report holds both.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def settle(
     max_steps: int,
     tick: Callable[[], None] | None = None,
 ) -> RestReport:
-    """Step until `STILL_STEPS` steps of `LONGEST` seconds have moved no vertex by more than `tolerance` metres.
+    """Step until `STILL_STEPS` steps of `LONGEST` seconds moved no vertex by more than `tolerance` metres.
 
     At most `max_steps` steps, half of them swinging.
     """
@@ -73,7 +73,7 @@ def settle(
 
 
 def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable[[], None] | None) -> int:
-    """Kinetic damping until no vertex moves by more than `tolerance` in `STILL_SWINGS` steps; the steps taken."""
+    """Kinetic damping until `STILL_SWINGS` steps moved no vertex by over `tolerance`; the steps taken."""
     energy = 0.0
     still = steps = 0
     while steps < max_steps and still < STILL_SWINGS:

@@ -112,7 +112,7 @@ class SolverTable(Table):
     contact_range: Annotated[float, Field(ge=5e-4, le=1e-2)] = 2.0e-3
     contact_stiffness: Positive = 1.0
     settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 150
-    settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 2.0e-4
+    settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 1.0e-4
 
 
 class ExpectTable(Table):

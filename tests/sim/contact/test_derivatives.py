@@ -196,7 +196,7 @@ def test_friction_slows_cloth_on_a_moving_collider(make_soup):
 
 
 def test_what_friction_holds_is_remembered_and_no_more_than_it_can_hold(make_soup):
-    """A patch that has slid by much keeps a displacement of `slip` against the slide, one by little all of it."""
+    """A patch that has slid by much keeps a displacement of `slip`, one that has by little all of it."""
     for slide, kept in ((0.4 * SLIP, 0.4 * SLIP), (50.0 * SLIP, SLIP)):
         start = point_over_triangle(1e-3)
         soup = make_soup(1, 1)
