@@ -240,6 +240,23 @@ def positive_part(s: strainv) -> strainv:
     return strainv((s[0] - low) * k, (s[1] - low) * k, s[2] * k)
 
 
+@wp.func
+def corner_stiffness(
+    ni: wp.vec2d, nj: wp.vec2d, f1: wp.vec3d, f2: wp.vec3d, c: wp.vec4d, s: strainv
+) -> wp.mat33d:
+    """B_i^T C B_j + n_i^T S n_j I with B_i = [n_i1 f1; n_i2 f2; n_i2 f1 + n_i1 f2]."""
+    k11 = c[0] * ni[0] * nj[0] + c[3] * ni[1] * nj[1]
+    k12 = c[1] * ni[0] * nj[1] + c[3] * ni[1] * nj[0]
+    k21 = c[1] * ni[1] * nj[0] + c[3] * ni[0] * nj[1]
+    k22 = c[2] * ni[1] * nj[1] + c[3] * ni[0] * nj[0]
+    block = wp.outer(f1, f1 * k11 + f2 * k12) + wp.outer(f2, f1 * k21 + f2 * k22)
+    geometric = ni[0] * (s[0] * nj[0] + s[2] * nj[1]) + ni[1] * (s[2] * nj[0] + s[1] * nj[1])
+    block[0, 0] = block[0, 0] + geometric
+    block[1, 1] = block[1, 1] + geometric
+    block[2, 2] = block[2, 2] + geometric
+    return block
+
+
 @wp.kernel
 def stretch_value(
     x: wp.array(dtype=wp.vec3d),
@@ -291,46 +308,28 @@ def stretch_derivatives(
     f2 = wp.vec3d(F[0, 1], F[1, 1], F[2, 1])
     p1 = (f1 * s[0] + f2 * s[2]) * area
     p2 = (f1 * s[2] + f2 * s[1]) * area
-    positive = positive_part(s)
-    c11 = two * c[0] * area
-    c12 = two * c[1] * area
-    c22 = two * c[2] * area
-    c33 = wp.float64(0.5) * c[3] * area
-    slot = int(0)
-    # int(0) keeps the loops dynamic: unrolled, the kernel compiles several times longer.
-    for i in range(int(0), int(3)):
-        ni = shape_gradient(b, i)
-        wp.atomic_add(gradient, face[i], p1 * ni[0] + p2 * ni[1])
-        for j in range(int(0), i + 1):
-            nj = shape_gradient(b, j)
-            # K_ij = A (B_i^T C B_j + n_i^T S+ n_j I) with B_i = [n_i1 f1; n_i2 f2; n_i2 f1 + n_i1 f2]
-            k11 = c11 * ni[0] * nj[0] + c33 * ni[1] * nj[1]
-            k12 = c12 * ni[0] * nj[1] + c33 * ni[1] * nj[0]
-            k21 = c12 * ni[1] * nj[0] + c33 * ni[0] * nj[1]
-            k22 = c22 * ni[1] * nj[1] + c33 * ni[0] * nj[0]
-            block = wp.outer(f1, f1 * k11 + f2 * k12) + wp.outer(f2, f1 * k21 + f2 * k22)
-            geometric = area * (
-                ni[0] * (positive[0] * nj[0] + positive[2] * nj[1])
-                + ni[1] * (positive[2] * nj[0] + positive[1] * nj[1])
-            )
-            block[0, 0] = block[0, 0] + geometric
-            block[1, 1] = block[1, 1] + geometric
-            block[2, 2] = block[2, 2] + geometric
-            if i == j:
-                wp.atomic_add(matrix.diagonal, face[i], block)
-            else:
-                wp.atomic_add(matrix.values, model.slots[f, slot], block)
-                slot += 1
-
-
-@wp.func
-def shape_gradient(b: wp.mat22d, i: int) -> wp.vec2d:
-    """Gradient of the i-th linear shape function in material coordinates."""
-    if i == 1:
-        return wp.vec2d(b[0, 0], b[0, 1])
-    if i == 2:
-        return wp.vec2d(b[1, 0], b[1, 1])
-    return wp.vec2d(-b[0, 0] - b[1, 0], -b[0, 1] - b[1, 1])
+    positive = positive_part(s) * area
+    coefficients = wp.vec4d(two * c[0], two * c[1], two * c[2], wp.float64(0.5) * c[3]) * area
+    # Gradients of the shape functions of corners 1 and 2. Corner 0 has what makes every sum over corners
+    # vanish: to move all of them alike strains nothing.
+    n1 = wp.vec2d(b[0, 0], b[0, 1])
+    n2 = wp.vec2d(b[1, 0], b[1, 1])
+    g1 = p1 * n1[0] + p2 * n1[1]
+    g2 = p1 * n2[0] + p2 * n2[1]
+    wp.atomic_add(gradient, face[0], -(g1 + g2))
+    wp.atomic_add(gradient, face[1], g1)
+    wp.atomic_add(gradient, face[2], g2)
+    k11 = corner_stiffness(n1, n1, f1, f2, coefficients, positive)
+    k21 = corner_stiffness(n2, n1, f1, f2, coefficients, positive)
+    k22 = corner_stiffness(n2, n2, f1, f2, coefficients, positive)
+    k10 = -(k11 + wp.transpose(k21))
+    k20 = -(k21 + k22)
+    wp.atomic_add(matrix.diagonal, face[0], -(k10 + k20))
+    wp.atomic_add(matrix.diagonal, face[1], k11)
+    wp.atomic_add(matrix.diagonal, face[2], k22)
+    wp.atomic_add(matrix.values, model.slots[f, 0], k10)
+    wp.atomic_add(matrix.values, model.slots[f, 1], k20)
+    wp.atomic_add(matrix.values, model.slots[f, 2], k21)
 
 
 @wp.kernel
