@@ -8,8 +8,10 @@ the body within `ROOM` is drawn inwards, where cloth is near,
 
 g the gap and t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between
 them. The displacement is continuous in t: when limbs part, the collider turns back into the body and the
-cloth between them comes out on the right side. Faces of the body with a vertex so moved are the masked faces
-of the frame.
+cloth between them comes out on the right side. In a crease the ray that measures the depth may run along the
+other part and meet it far away: s grows by no more than the way along the surface, `STEEPEST`, at which
+surfaces that cut each other at a right angle part. Faces of the body with a vertex so moved are the masked
+faces of the frame.
 """
 
 import igl
@@ -37,6 +39,9 @@ SAME = 1.0e-8
 """Metres below which collider and body do not differ: the rounding of a move that is made in parts."""
 
 MAX_HITS = 12
+
+STEEPEST = 1.0
+"""Most that the displacement may grow per metre along the surface."""
 
 
 @wp.kernel
@@ -89,6 +94,7 @@ class SelfClearance:
         self._normals = wp.zeros(len(vertices), dtype=wp.vec3, device=device)
         self._free = wp.zeros(len(vertices), dtype=float, device=device)
         self._mesh = wp.Mesh(self._points, wp.array(faces.ravel(), dtype=wp.int32, device=device))
+        self._edges = igl.edges(faces.astype(np.int64))
         adjacency = igl.adjacency_matrix(faces.astype(np.int64)).astype(np.float64)
         degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
         self._average = degree @ adjacency
@@ -109,6 +115,7 @@ class SelfClearance:
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals)
         inwards = np.where(free < 0.0, 0.5 * ROOM - free, 0.5 * np.maximum(ROOM - free, 0.0))
+        self._flatten(inwards, vertices)
         moved = inwards > 0.0
         crowded = np.flatnonzero(moved)
         beside = vertices if standing is None else standing
@@ -123,6 +130,18 @@ class SelfClearance:
         for _ in range(3):
             inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
         return vertices - inwards[:, None] * normals
+
+    def _flatten(self, inwards: NDArray[np.float64], vertices: NDArray[np.float64]) -> None:
+        """Lower `inwards` (N,) to the largest function below it that is nowhere steeper than `STEEPEST`."""
+        edges = self._edges[(inwards[self._edges] > 0.0).any(axis=1)]
+        rise = STEEPEST * np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+        here, there = np.concatenate([edges, edges[:, ::-1]]).T
+        rise = np.concatenate([rise, rise])
+        while True:
+            allowed = inwards[there] + rise
+            if (inwards[here] <= allowed + SAME).all():
+                return
+            np.minimum.at(inwards, here, allowed)
 
     def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
         """Indices of the faces on which `collider` differs from the body."""
