@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from muslin.sim.body.interior import MASK_GAP_M, interior_points, masked_face_is_interior
-from muslin.sim.contact.clearance import ROOM, SelfClearance
+from muslin.sim.contact.clearance import ROOM, STEEPEST, SelfClearance
 from muslin.sim.dataset.intersections import count_intersections
 
 RADIUS = 0.1
@@ -101,3 +101,22 @@ def test_collider_moves_smoothly_as_the_spheres_meet():
     step = np.abs(np.diff(gaps)).max()
     jumps = np.linalg.norm(np.diff(colliders, axis=0), axis=2)
     assert jumps.max() < 12 * step, "no vertex may leap: cloth could not follow"
+
+
+def test_displacement_grows_no_faster_than_the_way_from_the_crease():
+    """Boxes that cut each other at right angles: a ray along one's wall meets it only at its far end.
+
+    The vertices on the crease have faces that show outside and stay: what is behind them starts at two edges.
+    """
+    box = trimesh.creation.box((0.12, 0.12, 0.12))
+    for _ in range(4):
+        box = box.subdivide()
+    far = np.array([0.03, 0.03, 0.0])
+    vertices = np.concatenate([box.vertices - far, box.vertices + far])
+    faces = np.concatenate([box.faces, box.faces + len(box.vertices)]).astype(np.int32)
+    collider = SelfClearance(vertices, faces, "cpu").collider(vertices, vertices)
+    drawn = np.linalg.norm(collider - vertices, axis=1)
+    edges = igl.edges(faces.astype(np.int64))
+    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    assert drawn.max() > 0.02
+    assert (np.abs(drawn[edges[:, 0]] - drawn[edges[:, 1]]) <= 2.0 * STEEPEST * length + 1e-9).all()
