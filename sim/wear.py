@@ -75,8 +75,7 @@ class WornGarment:
         self.translation = translation
         new = self.model.transforms(self.beta, self.theta, self.translation)[0]
         change = new @ np.linalg.inv(old)
-        here = (self.sim.positions, self.sim.collider_vertices)
-        self.sim.place(*(x @ change[:3, :3].T + change[:3, 3] for x in here))
+        self.sim.turn_world(change[:3, :3], change[:3, 3])
 
     def morph(self, beta: NDArray[np.float64], theta: NDArray[np.float64], tick: Tick = None) -> None:
         """Change shape and pose at rest, in steps in which no body vertex moves more than `MORPH_MOVE`."""

@@ -7,9 +7,10 @@ smooth:
 
     f1(y) = 2 y / eps - (y / eps)^2 for y < eps, else 1;    f0' = f1.
 
-s_i, the bristles, are what is elastic of the displacement so far: after a step each contact's u, cut to eps,
-goes back to its vertices on the cloth as their mean by force. So cloth below the cone of friction comes to
-rest, bent by less than eps; without s it would creep. A vertex that touches nothing forgets.
+s_i, the bristles, are what is elastic of the displacement so far: after a step, what each contact's u, cut
+to eps, has gained goes back to its vertices on the cloth, as their mean by force. So cloth below the cone of
+friction comes to rest, displaced by less than eps; without s it would creep. (Were u itself shared out and not
+its gain, the bristles would spread over the cloth even at rest.) A vertex that touches nothing forgets.
 
 Sources: Li et al. 2020, "Incremental potential contact", section 5 (potential); Dahl 1968 and Cundall, Strack
 1979 (elastic displacement with a limit).
@@ -115,7 +116,7 @@ def share_bristles(
     total: wp.array(dtype=wp.vec3d),
     weight: wp.array(dtype=wp.float64),
 ):
-    """Adds each contact's displacement at the end of the step, cut to eps, to its vertices on the cloth.
+    """Adds what each contact's displacement, cut to eps, has gained in the step to its vertices on the cloth.
 
     The two sides of a contact of cloth with cloth take half of it each, in opposite directions.
     """
@@ -126,6 +127,7 @@ def share_bristles(
     y = wp.length(u)
     if y > model.slip:
         u = u * (model.slip / y)
+    u = u - slip_vector(model, k, start, start)
     sides = wp.float64(2.0)
     for i in range(int(0), int(4)):
         if pair[i] >= model.num_cloth:
@@ -141,8 +143,9 @@ def share_bristles(
 def set_bristles(
     total: wp.array(dtype=wp.vec3d), weight: wp.array(dtype=wp.float64), bristle: wp.array(dtype=wp.vec3d)
 ):
-    """bristle = total / weight, zero where there is no contact."""
+    """bristle += total / weight; zero where there is no contact."""
     i = wp.tid()
-    bristle[i] = wp.vec3d()
     if weight[i] > wp.float64(0.0):
-        bristle[i] = total[i] / weight[i]
+        bristle[i] = bristle[i] + total[i] / weight[i]
+    else:
+        bristle[i] = wp.vec3d()

@@ -191,9 +191,9 @@ class ContactSystem:
             )
         wp.launch(set_bristles, self.num_cloth, [*totals, self.friction.bristle], device=self.device)
 
-    def forget_friction(self) -> None:
-        """Nothing has been displaced."""
-        self.friction.bristle.zero_()
+    def turn_friction(self, turn: NDArray[np.float64]) -> None:
+        """What friction holds turns with the world, by a rotation (3, 3); zeros let go of it."""
+        self.friction.bristle.assign(self.friction.bristle.numpy() @ turn.T)
 
     def smallest_distance(self, x: wp.array) -> float:
         """Smallest distance among the listed pairs, m; infinity where none is listed.

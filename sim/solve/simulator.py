@@ -141,7 +141,12 @@ class ClothSimulator:
     def place(self, positions: NDArray[np.float64], collider_vertices: NDArray[np.float64]) -> None:
         """Put cloth and collider somewhere else, at rest; they must not intersect there."""
         self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
-        self.contact.forget_friction()
+        self.contact.turn_friction(np.zeros((3, 3)))
+
+    def turn_world(self, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
+        """Move all there is as one rigid piece, x -> turn x + shift, with what friction holds, to rest there."""
+        self.restore(self.x.numpy() @ turn.T + shift, np.zeros_like(self.velocity))
+        self.contact.turn_friction(turn)
 
     def restore(self, x: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
         """Put the joint vertex array (V + N, 3) and the velocities back to a saved, free state."""

@@ -47,10 +47,10 @@ class RotationCase(CaseTable):
 
 def run(p: RotationCase) -> Outcome:
     """Rows: largest distance of a vertex from its turned place, both ways."""
-    still, turned, again = _laid(p, np.eye(3)), _laid(p, TURN), _laid(p, TURN)
-    _settle(p, still)
-    rest = still.positions @ TURN.T
-    turned.place(rest, turned.collider_vertices)
+    turned, again = _laid(p, np.eye(3)), _laid(p, TURN)
+    _settle(p, turned)
+    rest = turned.positions @ TURN.T
+    turned.turn_world(TURN, np.zeros(3))
     _settle(p, turned)
     _settle(p, again)
     names = ("rest turned by 90 degrees, settled again", "draped in the world turned by 90 degrees")
