@@ -9,7 +9,7 @@ smooth:
 
 s_i, the bristles, are what is elastic of the displacement so far: after a step, what each contact's u, cut
 to eps, has gained goes back to its vertices on the cloth, as their mean by force. So cloth below the cone of
-friction comes to rest, displaced by less than eps; without s it would creep. (Were u itself shared out and not
+friction comes to rest, displaced by less than eps; without s it would creep. (Were u itself shared out, not
 its gain, the bristles would spread over the cloth even at rest.) A vertex that touches nothing forgets.
 
 Sources: Li et al. 2020, "Incremental potential contact", section 5 (potential); Dahl 1968 and Cundall, Strack

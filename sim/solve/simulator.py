@@ -144,7 +144,7 @@ class ClothSimulator:
         self.contact.turn_friction(np.zeros((3, 3)))
 
     def turn_world(self, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
-        """Move all there is as one rigid piece, x -> turn x + shift, with what friction holds, to rest there."""
+        """Move everything, friction's memory too, as one rigid piece: x -> turn x + shift. Then it is at rest."""
         self.restore(self.x.numpy() @ turn.T + shift, np.zeros_like(self.velocity))
         self.contact.turn_friction(turn)
 
