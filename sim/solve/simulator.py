@@ -144,7 +144,7 @@ class ClothSimulator:
         self.contact.turn_friction(np.zeros((3, 3)))
 
     def turn_world(self, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
-        """Move everything as one rigid piece, friction's memory too: x -> turn x + shift. It is at rest then."""
+        """Move everything as one rigid piece, what friction holds too: x -> turn x + shift, to rest."""
         self.restore(self.x.numpy() @ turn.T + shift, np.zeros_like(self.velocity))
         self.contact.turn_friction(turn)
 
