@@ -322,6 +322,11 @@ class ClothSimulator:
         size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
         if not np.isfinite(size):
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
+        if moving:
+            # Squeezed cloth may ask to go anywhere; what is not near the way of what leads it waits for later.
+            bound = s.max_move + float(np.sqrt((told**2).sum(axis=1).max(initial=0.0)))
+            way = np.sqrt((p[:n] ** 2).sum(axis=1, keepdims=True))
+            p[:n] *= np.minimum(1.0, bound / np.maximum(way, bound))
         limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
         self.p.assign(p * limit)
         shared = limit * p[:n].mean(axis=0) if moving else None
