@@ -110,8 +110,7 @@ class ClothSimulator:
         if collider_target is not None:
             goal[self.cloth.num_vertices :] = collider_target
         if pin_targets is not None:
-            pinned = np.flatnonzero(self.pins)
-            goal[pinned] = pin_targets[pinned]
+            goal[: self.cloth.num_vertices][self.pins] = pin_targets[self.pins]
         report = StepReport()
         self.linear.fix(self.pins)
         try:
@@ -204,10 +203,8 @@ class ClothSimulator:
         self._energy_here = None
         led = self._led()
         remaining = np.where(led[:, None], goal - begin, 0.0)
-        arrived = not np.abs(remaining).max(initial=0.0) > 0.0
+        arrived = not np.abs(remaining).max(initial=0.0) > 0.0 or self._go_along(remaining)
         fraction = 1.0
-        if not arrived and self._go_along(remaining):
-            arrived = True
         iterations = advances = relaxing = 0
         while True:
             if not arrived and relaxing == 0:
@@ -225,8 +222,7 @@ class ClothSimulator:
             if not arrived:
                 continue
             iterations += 1
-            report.last_move = step * size
-            report.converged = size < s.tolerance
+            report.last_move, report.converged = step * size, size < s.tolerance
             solved = report.converged and iterations >= s.min_iterations
             # A direction along which nothing can be gained would come out the same again.
             if solved or step == 0.0 or iterations >= s.max_iterations:
@@ -283,13 +279,11 @@ class ClothSimulator:
         self._assemble(1.0 / dt)
         size, limit = self._direction(still, led, False, report)
         wp.copy(self.uncut, self.p)
-        safe = self.contact.cut_to_safety(self.x, self.p, self._scalar)
-        step = self._line_search(safe, 1.0 / dt)
+        step = self._line_search(self.contact.cut_to_safety(self.x, self.p, self._scalar), 1.0 / dt)
         if step == 0.0:
             # Shortened here and there, the direction may not go downhill; as a whole it does.
             wp.copy(self.p, self.uncut)
-            safe = self.contact.largest_step(self.x, self.p, self._scalar)
-            step = self._line_search(safe, 1.0 / dt)
+            step = self._line_search(self.contact.largest_step(self.x, self.p, self._scalar), 1.0 / dt)
         return size, step * limit
 
     def _direction(
@@ -323,10 +317,9 @@ class ClothSimulator:
         if not np.isfinite(size):
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
         if moving:
-            # Squeezed cloth may ask to go anywhere; what is not near the way of what leads it waits for later.
-            bound = s.max_move + float(np.sqrt((told**2).sum(axis=1).max(initial=0.0)))
-            way = np.sqrt((p[:n] ** 2).sum(axis=1, keepdims=True))
-            p[:n] *= np.minimum(1.0, bound / np.maximum(way, bound))
+            # Squeezed cloth may ask to go anywhere: no further than what leads it and `max_move`.
+            bound = s.max_move + np.linalg.norm(told, axis=1).max(initial=0.0)
+            p[:n] *= bound / np.maximum(np.linalg.norm(p[:n], axis=1, keepdims=True), bound)
         limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
         self.p.assign(p * limit)
         shared = limit * p[:n].mean(axis=0) if moving else None
