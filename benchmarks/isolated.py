@@ -19,8 +19,8 @@ with open(sys.argv[1], "w") as out:
     out.write(f"{used.ru_utime + used.ru_stime} {used.ru_maxrss}")
 sys.exit(abs(os.waitstatus_to_exitcode(status)))
 """
-"""Starts a command from a small process. Linux counts in a command's peak memory, in KiB, what its parent held
-when it was started."""
+"""Starts a command from a small process: Linux counts in a command's peak memory, in KiB, what its parent
+held when it was started."""
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
