@@ -10,7 +10,6 @@ from benchmarks.setting import DT, Setting
 from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 from muslin.sim.body.load import load_body
 from muslin.sim.cloth import build_cloth
-from muslin.sim.contact.system import ContactSettings
 from muslin.sim.device import open_device
 from muslin.sim.motion.arms import spread_arms
 from muslin.sim.motion.clips import load_motion
@@ -18,9 +17,8 @@ from muslin.sim.motion.grounding import fit_to_body
 from muslin.sim.motion.lead_in import lead_in
 from muslin.sim.relax import settle
 from muslin.sim.run import cut_garment
-from muslin.sim.scene import Scene, load_scene
-from muslin.sim.setting import fabric_of
-from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.scene import load_scene
+from muslin.sim.setting import fabric_of, settings_of
 from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.wear import WornGarment
 
@@ -94,22 +92,3 @@ def from_rest(times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Times in a clip, s, at times since the start: its pace grows evenly to 1 in `START_SECONDS`."""
     ramp = np.minimum(times, START_SECONDS)
     return ramp**2 / (2.0 * START_SECONDS) + times - ramp
-
-
-def settings_of(scene: Scene) -> tuple[ContactSettings, SolverSettings]:
-    """Contact and solver settings that a scene file asks for."""
-    s = scene.solver
-    contact = ContactSettings(
-        range=s.contact_range,
-        stiffness=s.contact_stiffness,
-        friction_body=scene.friction_body,
-        friction_cloth=scene.friction_cloth,
-    )
-    solver = SolverSettings(
-        gravity=scene.gravity,
-        damping=s.damping,
-        drag=s.drag,
-        tolerance=s.tolerance,
-        max_iterations=s.max_iterations,
-    )
-    return contact, solver

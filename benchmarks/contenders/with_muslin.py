@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from benchmarks.contenders.record import Record, contend
 from benchmarks.garment import SCENE, cloth_model
-from benchmarks.make_setting import settings_of
 from benchmarks.setting import DT, Setting
 from muslin.sim.contact.clearance import SelfClearance
 from muslin.sim.run import compile_kernels
 from muslin.sim.scene import load_scene
+from muslin.sim.setting import settings_of
 from muslin.sim.solve.simulator import ClothSimulator
 
 
