@@ -10,9 +10,8 @@ from pydantic import ValidationError
 from muslin.eval.validate.case import CaseTable
 from muslin.eval.validate.catalogue import CASES
 from muslin.garments.errors import InputError
+from muslin.sim.table_errors import explain
 from muslin.sim.toml_values import read_values
-
-DEFAULT_FOLDER = Path("scenes/validation")
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,8 @@ def load_case(path: Path, small: bool) -> CaseTable:
     changes = values.pop("small", {})
     if small:
         values |= changes
+    table = CASES[path.stem].table
     try:
-        return CASES[path.stem].table.model_validate(values)
+        return table.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"]) or "file"
-        raise InputError(f"{path}: {key} = {first['input']!r}: {first['msg']}; correct the file") from error
+        raise InputError(f"{path}: {explain(error.errors()[0], table)}") from error

@@ -126,11 +126,19 @@ def test_unknown_case_is_told_the_known_ones(tmp_path: Path) -> None:
         load_cases(FOLDER, small=True, only="trampoline")
 
 
-@pytest.mark.parametrize("line", ["bar = -1.0", "elements = 0", "beer = 2"])
-def test_wrong_values_are_named(tmp_path: Path, line: str) -> None:
-    key = line.split()[0]
+@pytest.mark.parametrize(
+    ("key", "line", "message"),
+    [
+        ("bar", "bar = -1.0", r"bar = -1\.0: .*greater than 0"),
+        ("elements", "elements = 0", "elements = 0: .*greater than or equal to 1"),
+        ("loads", "loads = [0.1, -0.1]", r"loads\.1 = -0\.1: .*greater than 0"),
+        ("beer", "beer = 2", "unknown key beer; allowed here are across, bar,"),
+        ("loads", "", "loads is missing"),
+    ],
+)
+def test_wrong_values_are_named(tmp_path: Path, key: str, line: str, message: str) -> None:
     text = (FOLDER / "hanging.toml").read_text().split("[small]")[0]
     kept = [old for old in text.splitlines() if not old.startswith(f"{key} ")]
     (tmp_path / "hanging.toml").write_text("\n".join([*kept, line]))
-    with pytest.raises(InputError, match=f"{key} = "):
+    with pytest.raises(InputError, match=message):
         load_cases(tmp_path, small=False)
