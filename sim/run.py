@@ -14,6 +14,7 @@ from muslin.garments.merge import merge_meshes
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.load import load_body
 from muslin.sim.body.model import BodyModel
+from muslin.sim.budget import with_budget
 from muslin.sim.certify import certify, solved
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.sample import BodyTrack, Sample
@@ -146,12 +147,7 @@ def _drape(scene: Scene, mesh: GarmentMesh, worn: WornGarment, work: _Work, star
     assert scene.body is not None
     beta = _beta(scene, worn.model)
     pose = a_pose() if scene.body.pose == "a" else np.zeros((24, 3))
-
-    def next_step() -> None:
-        worn.sim.work_left = scene.solver.max_work
-        work.tick()
-
-    worn.sim.work_left = scene.solver.max_work
+    next_step = with_budget(worn.sim, scene.solver.max_work, work.tick)
     try:
         worn.morph(beta, pose, next_step)
         worn.carry(worn.theta, np.array([0.0, float(worn.model.ground_offset(beta, pose)), 0.0]))
@@ -200,12 +196,7 @@ def _sequence(
     path = [*zip(way_in.poses[1:], way_in.translations[1:], strict=True)]
     path += [*zip(poses[1:], translations[1:], strict=True)]
     positions, states = [], []
-
-    def next_step() -> None:
-        worn.sim.work_left = scene.solver.max_work
-        work.tick()
-
-    worn.sim.work_left = scene.solver.max_work
+    next_step = with_budget(worn.sim, scene.solver.max_work, work.tick)
     for k, (theta, translation) in enumerate(path):
         passed = k + 1 - (len(way_in.poses) - 1)
         if (passed - 1) % substeps == 0:

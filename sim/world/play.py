@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.merge import merge_meshes
+from muslin.sim.budget import with_budget
 from muslin.sim.certify import certify, solved
 from muslin.sim.cloth import merge_cloths
 from muslin.sim.dataset.certificate import Certificate
@@ -96,12 +97,7 @@ class _Stage:
 
     def settle(self, tick: Tick) -> RestReport:
         s = self.scene.solver
-
-        def next_step() -> None:
-            self.sim.work_left = s.max_work
-            tick()
-
-        self.sim.work_left = s.max_work
+        next_step = with_budget(self.sim, s.max_work, tick)
         try:
             return settle(self.sim, s.settle_tolerance, s.settle_steps, tick=next_step)
         except SimulationError as error:
