@@ -57,7 +57,7 @@ def settle(
     steps = _swing(sim, SWING * tolerance, max_steps // 2, tick)
     dt, still = SWING_STEP, 0
     while steps < max_steps and still < STILL_STEPS:
-        moved = _step(sim, dt, inertia=False)
+        moved = measured_step(sim, dt, inertia=False)
         still = still + 1 if dt == LONGEST and moved < tolerance else 0
         dt = min(2.0 * dt, LONGEST)
         steps += 1
@@ -66,7 +66,7 @@ def settle(
     accurate = replace(sim.settings, max_iterations=POLISH_ITERATIONS, tolerance=POLISH_TOLERANCE)
     usual, sim.settings = sim.settings, accurate
     try:
-        moved = _step(sim, LONGEST, inertia=False)
+        moved = measured_step(sim, LONGEST, inertia=False)
     finally:
         sim.settings = usual
     return RestReport(steps + 1, moved, sim.force_residual(LONGEST), still >= STILL_STEPS)
@@ -77,7 +77,7 @@ def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable
     energy = 0.0
     still = steps = 0
     while steps < max_steps and still < STILL_SWINGS:
-        still = still + 1 if _step(sim, SWING_STEP, inertia=True) < tolerance else 0
+        still = still + 1 if measured_step(sim, SWING_STEP, inertia=True) < tolerance else 0
         steps += 1
         now = float(0.5 * (sim.cloth.mass[:, None] * sim.velocity**2).sum())
         if now < energy:
@@ -90,8 +90,8 @@ def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable
     return steps
 
 
-def _step(sim: ClothSimulator, dt: float, inertia: bool) -> float:
-    """One step; the largest move of a vertex, metres."""
+def measured_step(sim: ClothSimulator, dt: float, inertia: bool, friction: bool = True) -> float:
+    """One step of `dt` seconds beside a collider that stands still; the largest move of a vertex, metres."""
     before = sim.positions
-    sim.advance(None, dt, inertia=inertia)
+    sim.advance(None, dt, inertia=inertia, friction=friction)
     return float(np.linalg.norm(sim.positions - before, axis=1).max())

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.system import ContactSettings
+from muslin.sim.relax import measured_step
 from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
@@ -48,9 +49,7 @@ def equilibrium(
     Raises SimulationError where `max_steps` do not suffice.
     """
     for step in range(1, max_steps + 1):
-        before = sim.positions
-        sim.advance(None, dt, inertia=False, friction=friction)
-        moved = float(np.linalg.norm(sim.positions - before, axis=1).max())
+        moved = measured_step(sim, dt, inertia=False, friction=friction)
         if moved <= tolerance:
             return step
     raise SimulationError(
