@@ -38,12 +38,15 @@ class PlacedTable(MovingTable):
     repeat: RepeatTable | None = None
 
 
+Subdivisions = Annotated[int, Field(ge=0, le=6)]
+
+
 class Sphere(PlacedTable):
     """Around the origin, metres; an icosahedron divided `subdivisions` times: 10 4^n + 2 vertices."""
 
     shape: Literal["sphere"]
     radius: Positive
-    subdivisions: Annotated[int, Field(ge=0, le=6)] = 4
+    subdivisions: Subdivisions = 4
 
 
 class Plane(PlacedTable):

@@ -23,6 +23,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.world.tables import Subdivisions
 
 GRAVITY = 9.81
 SAMPLES = 21
@@ -38,7 +39,7 @@ class Drape(CaseTable):
 
     side: Positive
     radius: Positive
-    sphere_subdivisions: Count
+    sphere_subdivisions: Subdivisions
     young: Positive
     poisson: float
     thickness: Positive

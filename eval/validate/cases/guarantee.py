@@ -20,6 +20,7 @@ from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.material import load_fabric
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.world.tables import Subdivisions
 
 
 class Guarantee(CaseTable):
@@ -29,7 +30,7 @@ class Guarantee(CaseTable):
     fabrics: list[str]
     side: Positive
     radius: Positive
-    sphere_subdivisions: Count
+    sphere_subdivisions: Subdivisions
     elements: Count
     dt: Positive
     frames: Count

@@ -19,6 +19,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.world.tables import Subdivisions
 
 TURN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
@@ -36,7 +37,7 @@ class RotationCase(CaseTable):
     density: Positive
     side: Positive
     radius: Positive
-    sphere_subdivisions: Count
+    sphere_subdivisions: Subdivisions
     elements: Count
     friction: Annotated[float, Field(ge=0.0)]
     dt: Positive
