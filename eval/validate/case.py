@@ -6,17 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+from muslin.sim.tables import Table
+
 Count = Annotated[int, Field(ge=1)]
 
 
-class CaseTable(BaseModel):
+class CaseTable(Table):
     """Parameters of a case, as its file in scenes/validation/ holds them; SI units, bars without a unit are
     shares of the expected value."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     title: str
     seed: Annotated[int, Field(ge=0)] = 0

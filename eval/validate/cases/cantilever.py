@@ -13,28 +13,22 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import Outcome, Plot, Row, Series
 from muslin.eval.validate.elastica import heavy_elastica
-from muslin.eval.validate.meshes import Triangulation, mirrored, rectangle
+from muslin.eval.validate.meshes import Triangulation, mirrored
+from muslin.eval.validate.strip import Strip
 from muslin.eval.validate.world import alone, equilibrium, exact, level
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 
 
-class Cantilever(CaseTable):
-    """`numbers`: Gamma; `length`, `width`, `thickness` m; `density` kg/m^2; `elements` along and `across`."""
+class Cantilever(Strip):
+    """`numbers`: Gamma; `length` is L, of one arm."""
 
     numbers: list[Positive]
-    triangulations: list[Triangulation]
-    length: Positive
-    width: Positive
-    thickness: Positive
-    density: Positive
-    elements: Count
-    across: Count
-    bar: Positive
 
 
 def run(p: Cantilever) -> Outcome:
@@ -77,8 +71,7 @@ def simulate(
     rigidity = p.density * GRAVITY * p.length**3 / number
     young = 12.0 * rigidity / p.thickness**3
     fabric = isotropic_fabric(young, 0.0, p.thickness, p.density)
-    arm = rectangle(p.width, p.length, p.across, p.elements, kind, p.seed)
-    mesh = mirrored(arm)
+    mesh = mirrored(p.mesh(kind))
     along = np.abs(mesh.panel_vertices[:, 1])
     sim = alone(build_cloth(mesh, fabric), level(mesh.panel_vertices), exact((0.0, -GRAVITY, 0.0)))
     sim.pins[:] = along == 0.0

@@ -13,28 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
-from muslin.eval.validate.meshes import Triangulation, rectangle
+from muslin.eval.validate.case import Outcome, Plot, Row, Series
+from muslin.eval.validate.meshes import Triangulation
+from muslin.eval.validate.strip import Strip
 from muslin.eval.validate.world import alone, equilibrium, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 
 
-class Catenary(CaseTable):
-    """`spans` D / L; `length`, `width`, `thickness` m; `young` Pa; `bar` as a share of the span."""
+class Catenary(Strip):
+    """`spans` D / L; `young` Pa; `bar` as a share of the span."""
 
     spans: list[Positive]
-    triangulations: list[Triangulation]
-    length: Positive
-    width: Positive
-    thickness: Positive
     young: Positive
-    density: Positive
-    elements: Count
-    across: Count
-    bar: Positive
 
 
 def run(p: Catenary) -> Outcome:
@@ -77,7 +71,7 @@ def simulate(
     p: Catenary, span: float, kind: Triangulation
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Arc length of every vertex from the middle and its place (V, 2), in lengths of the strip."""
-    mesh = rectangle(p.width, p.length, p.across, p.elements, kind, p.seed)
+    mesh = p.mesh(kind)
     s = mesh.panel_vertices[:, 1] / p.length - 0.5
     x, y = arc(s, span)
     start = np.stack([x * p.length, y * p.length, -mesh.panel_vertices[:, 0]], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.colliders import sphere
 from muslin.eval.validate.meshes import Triangulation, mirrored, rectangle
 from muslin.eval.validate.world import equilibrium, exact, level
@@ -23,6 +23,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 from muslin.sim.world.tables import Subdivisions
 
 GRAVITY = 9.81

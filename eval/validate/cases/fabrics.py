@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.patch import pull
 from muslin.sim.material import load_fabric
+from muslin.sim.tables import Positive
 
 DIRECTIONS = {"warp": (0.0, 0), "45 degrees": (45.0, 2), "weft": (90.0, 4)}
 """Angle to the warp, degrees, and the row of `stretch_strained` measured there."""

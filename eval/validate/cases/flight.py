@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import alone, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric, load_fabric
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 

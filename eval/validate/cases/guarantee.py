@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Positive, Row
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.colliders import slope, sphere
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import NO_FACES, level
@@ -20,6 +20,7 @@ from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.material import load_fabric
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 from muslin.sim.world.tables import Subdivisions
 
 

@@ -16,27 +16,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
-from muslin.eval.validate.meshes import Triangulation, rectangle
+from muslin.eval.validate.case import Outcome, Plot, Row, Series
+from muslin.eval.validate.meshes import Triangulation
+from muslin.eval.validate.strip import Strip
 from muslin.eval.validate.world import alone, equilibrium, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 
 
-class Hanging(CaseTable):
-    """`loads`: sigma g L / (E h), the weight over the stiffness; sizes in metres, `density` kg/m^2."""
+class Hanging(Strip):
+    """`loads`: sigma g L / (E h), the weight over the stiffness."""
 
     loads: list[Positive]
-    triangulations: list[Triangulation]
-    length: Positive
-    width: Positive
-    thickness: Positive
-    density: Positive
-    elements: Count
-    across: Count
-    bar: Positive
 
 
 def run(p: Hanging) -> Outcome:
@@ -81,7 +75,7 @@ def depth(s: NDArray[np.float64], load: float) -> NDArray[np.float64]:
 def simulate(p: Hanging, load: float, kind: Triangulation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Arc length and depth of every vertex, in lengths of the strip."""
     young = p.density * GRAVITY * p.length / (load * p.thickness)
-    mesh = rectangle(p.width, p.length, p.across, p.elements, kind, p.seed)
+    mesh = p.mesh(kind)
     s = 1.0 - mesh.panel_vertices[:, 1] / p.length
     start = np.stack([mesh.panel_vertices[:, 0], -s * p.length, np.zeros(len(s))], axis=1)
     cloth = build_cloth(mesh, isotropic_fabric(young, 0.0, p.thickness, p.density))

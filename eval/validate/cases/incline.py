@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.colliders import slope
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import balance, exact
@@ -23,6 +23,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import load_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 BRACKET = 0.2

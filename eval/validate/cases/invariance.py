@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Positive, Row
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import alone, elastic_energy, elastic_forces, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import fabric_names, load_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 
 T = TypeVar("T")
 

@@ -13,11 +13,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import alone, exact
 from muslin.sim.cloth import ClothModel, build_cloth
 from muslin.sim.material import isotropic_fabric
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 

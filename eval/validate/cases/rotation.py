@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Positive, Row
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.colliders import sphere
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import equilibrium, exact, level
@@ -19,6 +19,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 from muslin.sim.world.tables import Subdivisions
 
 TURN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])

@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Positive, Row, Series
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.patch import pull
 from muslin.sim.material import isotropic_fabric
+from muslin.sim.tables import Positive
 
 
 class Stretch(CaseTable):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Positive, Row
+from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.colliders import slope
 from muslin.eval.validate.meshes import rectangle
 from muslin.eval.validate.world import balance, contact_forces, exact
@@ -17,6 +17,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.tables import Positive
 
 GRAVITY = 9.81
 
