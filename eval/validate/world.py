@@ -15,6 +15,10 @@ from muslin.sim.solve.simulator import ClothSimulator
 
 Points = NDArray[np.float64]
 
+GRAVITY = 9.81
+"""m/s^2"""
+DOWN = (0.0, -GRAVITY, 0.0)
+
 NO_FACES: NDArray[np.int32] = np.zeros((0, 3), dtype=np.int32)
 APART = ContactSettings(range=1.0e-5, margin=1.0e-3)
 """For cloth that touches nothing: a barrier so short that no mesh is within its own."""

@@ -17,12 +17,10 @@ from muslin.eval.validate.case import Outcome, Plot, Row, Series
 from muslin.eval.validate.elastica import heavy_elastica
 from muslin.eval.validate.meshes import Triangulation, mirrored
 from muslin.eval.validate.strip import Strip
-from muslin.eval.validate.world import alone, equilibrium, exact, level
+from muslin.eval.validate.world import DOWN, GRAVITY, alone, equilibrium, exact, level
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Cantilever(Strip):
@@ -73,7 +71,7 @@ def simulate(
     fabric = isotropic_fabric(young, 0.0, p.thickness, p.density)
     mesh = mirrored(p.mesh(kind))
     along = np.abs(mesh.panel_vertices[:, 1])
-    sim = alone(build_cloth(mesh, fabric), level(mesh.panel_vertices), exact((0.0, -GRAVITY, 0.0)))
+    sim = alone(build_cloth(mesh, fabric), level(mesh.panel_vertices), exact(DOWN))
     sim.pins[:] = along == 0.0
     equilibrium(sim, 1.0e-6 * p.length)
     reach, height = np.abs(sim.positions[:, 2]) / p.length, sim.positions[:, 1] / p.length

@@ -16,12 +16,10 @@ from scipy.optimize import brentq
 from muslin.eval.validate.case import Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import Triangulation
 from muslin.eval.validate.strip import Strip
-from muslin.eval.validate.world import alone, equilibrium, exact
+from muslin.eval.validate.world import DOWN, alone, equilibrium, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Catenary(Strip):
@@ -76,7 +74,7 @@ def simulate(
     x, y = arc(s, span)
     start = np.stack([x * p.length, y * p.length, -mesh.panel_vertices[:, 0]], axis=1)
     cloth = build_cloth(mesh, isotropic_fabric(p.young, 0.0, p.thickness, p.density))
-    sim = alone(cloth, start, exact((0.0, -GRAVITY, 0.0)))
+    sim = alone(cloth, start, exact(DOWN))
     sim.pins[:] = np.abs(s) == 0.5
     equilibrium(sim, 1.0e-6 * p.length)
     return s, sim.positions[:, :2] / p.length

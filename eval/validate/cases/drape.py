@@ -17,7 +17,7 @@ from scipy.interpolate import LinearNDInterpolator
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.colliders import sphere
 from muslin.eval.validate.meshes import Triangulation, mirrored, rectangle
-from muslin.eval.validate.world import equilibrium, exact, level
+from muslin.eval.validate.world import DOWN, equilibrium, exact, level
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
@@ -26,7 +26,6 @@ from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.tables import Positive
 from muslin.sim.world.tables import Subdivisions
 
-GRAVITY = 9.81
 SAMPLES = 21
 """Points along a side at which shapes are compared."""
 START_GAP = 0.8
@@ -181,6 +180,6 @@ def _laid(p: Drape, mesh: GarmentMesh) -> ClothSimulator:
     panel = mesh.panel_vertices - [0.5 * p.side, 0.0]
     flat = level(panel, p.radius + START_GAP * contact.range)
     ball = sphere(p.radius, p.sphere_subdivisions)
-    sim = ClothSimulator(cloth, flat, *ball, contact, exact((0.0, -GRAVITY, 0.0), 1.0e-8))
+    sim = ClothSimulator(cloth, flat, *ball, contact, exact(DOWN, 1.0e-8))
     sim.pins[np.argmin(np.linalg.norm(panel, axis=1))] = True
     return sim

@@ -18,12 +18,10 @@ import numpy as np
 
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import rectangle
-from muslin.eval.validate.world import alone, exact
+from muslin.eval.validate.world import DOWN, GRAVITY, alone, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric, load_fabric
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Flight(CaseTable):
@@ -80,7 +78,7 @@ def flutter(p: Flight) -> tuple[float, float]:
     mesh = rectangle(p.side, p.side, p.elements, p.elements, "irregular", p.seed)
     cloth = build_cloth(mesh, load_fabric(p.fabric))
     # Linear systems solved roughly leave momentum behind: their residual need not add up to zero.
-    solver = exact((0.0, -GRAVITY, 0.0), linear_tolerance=1.0e-10)
+    solver = exact(DOWN, linear_tolerance=1.0e-10)
     sim = alone(cloth, np.pad(mesh.panel_vertices, ((0, 0), (0, 1))), solver)
     sim.velocity = np.random.default_rng(p.seed).normal(0.0, p.speed, (cloth.num_vertices, 3))
     mass, total = cloth.mass, cloth.mass.sum()

@@ -19,12 +19,10 @@ from numpy.typing import NDArray
 from muslin.eval.validate.case import Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import Triangulation
 from muslin.eval.validate.strip import Strip
-from muslin.eval.validate.world import alone, equilibrium, exact
+from muslin.eval.validate.world import DOWN, GRAVITY, alone, equilibrium, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Hanging(Strip):
@@ -79,7 +77,7 @@ def simulate(p: Hanging, load: float, kind: Triangulation) -> tuple[NDArray[np.f
     s = 1.0 - mesh.panel_vertices[:, 1] / p.length
     start = np.stack([mesh.panel_vertices[:, 0], -s * p.length, np.zeros(len(s))], axis=1)
     cloth = build_cloth(mesh, isotropic_fabric(young, 0.0, p.thickness, p.density))
-    sim = alone(cloth, start, exact((0.0, -GRAVITY, 0.0)))
+    sim = alone(cloth, start, exact(DOWN))
     sim.pins[:] = s == 0.0
     equilibrium(sim, 1.0e-7 * p.length)
     return s, -sim.positions[:, 1] / p.length

@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.colliders import slope
 from muslin.eval.validate.meshes import rectangle
-from muslin.eval.validate.world import balance, exact
+from muslin.eval.validate.world import DOWN, GRAVITY, balance, exact
 from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import load_fabric
 from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.tables import Positive
 
-GRAVITY = 9.81
 BRACKET = 0.2
 """The threshold is looked for within this share of atan(mu)."""
 START_GAP = 0.7
@@ -120,7 +119,7 @@ def slide(p: Incline, mu: float, angle: float) -> Slide:
         build_cloth(mesh, load_fabric(p.fabric)), places, *ground, contact, exact((*press.tolist(),), 1.0e-7)
     )
     balance(sim, PRESSED, dt=0.2)
-    sim.set_gravity((0.0, -GRAVITY, 0.0))
+    sim.set_gravity(DOWN)
     steps = round(p.seconds / p.dt)
     speeds = np.zeros(steps)
     for k in range(steps):

@@ -15,12 +15,10 @@ from scipy.integrate import solve_ivp
 
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
 from muslin.eval.validate.meshes import rectangle
-from muslin.eval.validate.world import alone, exact
+from muslin.eval.validate.world import DOWN, GRAVITY, alone, exact
 from muslin.sim.cloth import ClothModel, build_cloth
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Pendulum(CaseTable):
@@ -107,7 +105,7 @@ def swing(p: Pendulum, amplitude: float, dt: float, seconds: float) -> tuple[np.
     mesh = rectangle(0.5 * p.length, p.length, p.elements, 2 * p.elements, "structured", p.seed)
     x = below * np.sin(amplitude)
     start = np.stack([x, -below * np.cos(amplitude), -mesh.panel_vertices[:, 0]], axis=1)
-    sim = alone(cloth, start, exact((0.0, -GRAVITY, 0.0)))
+    sim = alone(cloth, start, exact(DOWN))
     sim.pins[:] = below == 0.0
     lever = cloth.mass * below
     angles = []

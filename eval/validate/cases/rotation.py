@@ -14,7 +14,7 @@ from pydantic import Field
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.colliders import sphere
 from muslin.eval.validate.meshes import rectangle
-from muslin.eval.validate.world import equilibrium, exact, level
+from muslin.eval.validate.world import DOWN, equilibrium, exact, level
 from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
@@ -77,7 +77,7 @@ def _laid(p: RotationCase, turn: NDArray[np.float64]) -> ClothSimulator:
     flat = level(panel, p.radius + START_GAP * contact.range)
     vertices, faces = sphere(p.radius, p.sphere_subdivisions)
     cloth = build_cloth(mesh, isotropic_fabric(p.young, p.poisson, p.thickness, p.density))
-    solver = exact((0.0, -9.81, 0.0), 1.0e-9)
+    solver = exact(DOWN, 1.0e-9)
     sim = ClothSimulator(cloth, flat @ turn.T, vertices @ turn.T, faces, contact, solver)
     sim.pins[np.argmin(np.linalg.norm(panel, axis=1))] = True
     return sim

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from muslin.eval.validate.case import CaseTable, Count, Outcome, Row
 from muslin.eval.validate.colliders import slope
 from muslin.eval.validate.meshes import rectangle
-from muslin.eval.validate.world import balance, contact_forces, exact
+from muslin.eval.validate.world import DOWN, GRAVITY, balance, contact_forces, exact
 from muslin.garments.errors import InputError
 from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.tables import Positive
-
-GRAVITY = 9.81
 
 
 class Support(CaseTable):
@@ -94,7 +92,7 @@ def simulate(p: Support) -> tuple[ClothSimulator, float]:
     mesh = rectangle(p.width, p.length, p.across, p.elements, "irregular", p.seed)
     x, y = folded(mesh.panel_vertices[:, 1], p.length, p.gap)
     places = np.stack([x, y + contact.range, -mesh.panel_vertices[:, 0]], axis=1)
-    solver = exact((0.0, -GRAVITY, 0.0))
+    solver = exact(DOWN)
     cloth = build_cloth(mesh, isotropic_fabric(p.young, 0.3, p.thickness, p.density))
     sim = ClothSimulator(cloth, places, *slope(0.0, 4.0 * p.length), contact, solver)
     balance(sim, p.residual, p.dt)
