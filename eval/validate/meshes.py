@@ -54,6 +54,12 @@ def mirrored(mesh: GarmentMesh) -> GarmentMesh:
     return flat_mesh(both, np.concatenate([faces, image[faces][:, ::-1]]))
 
 
+def centred(mesh: GarmentMesh) -> NDArray[np.float64]:
+    """(V, 2) panel coordinates, metres, about the middle of the panel's extent."""
+    points = mesh.panel_vertices
+    return points - 0.5 * (points.min(axis=0) + points.max(axis=0))
+
+
 def flat_mesh(points: NDArray[np.float64], faces: NDArray[np.integer]) -> GarmentMesh:
     """One panel without seams of points (V, 2), metres, and counter-clockwise faces (F, 3)."""
     triangles = faces.astype(np.int32)

@@ -7,49 +7,33 @@ is that of an energy and of nothing that happened before."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
-from muslin.eval.validate.case import CaseTable, Count, Outcome, Plot, Row, Series
-from muslin.eval.validate.colliders import sphere
-from muslin.eval.validate.meshes import Triangulation, mirrored, rectangle
-from muslin.eval.validate.world import DOWN, equilibrium, exact, level
+from muslin.eval.validate.case import Count, Outcome, Plot, Row, Series
+from muslin.eval.validate.meshes import Triangulation, centred, mirrored, rectangle
+from muslin.eval.validate.on_sphere import SheetOnSphere
+from muslin.eval.validate.world import equilibrium
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.cloth import build_cloth
-from muslin.sim.contact.system import ContactSettings
-from muslin.sim.material import isotropic_fabric
 from muslin.sim.solve.simulator import ClothSimulator
 from muslin.sim.tables import Positive
-from muslin.sim.world.tables import Subdivisions
 
 SAMPLES = 21
 """Points along a side at which shapes are compared."""
-START_GAP = 0.8
-"""Height of the sheet above the sphere, in ranges of the barrier."""
 
 
-class Drape(CaseTable):
+class Drape(SheetOnSphere):
     """`elements` along a side and steps `dts` s of the fall, each half as large as the one before; the fall
-    lasts `seconds`; `orientations` and `seeds` are compared at `compared` elements; `dt` s and `tolerance` m
-    of the way to equilibrium; bars: of the orders, and of the distance as a share of the side."""
+    lasts `seconds`; `orientations` and `seeds` are compared at `compared` elements; bars: of the orders,
+    and of the distance as a share of the side."""
 
-    side: Positive
-    radius: Positive
-    sphere_subdivisions: Subdivisions
-    young: Positive
-    poisson: float
-    thickness: Positive
-    density: Positive
     elements: list[Count]
     orientations: list[Triangulation]
     seeds: list[int]
     compared: Count
-    dt: Positive
-    tolerance: Positive
     dts: list[Positive]
     seconds: Positive
     fall_elements: Count
@@ -59,13 +43,8 @@ class Drape(CaseTable):
     bar_orientation: Positive
 
 
-@dataclass(frozen=True)
-class Shape:
-    """A drape: places (S, S, 3), metres, of a grid of material points, and the mesh's own."""
-
-    grid: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    mesh: GarmentMesh
+Shape = NDArray[np.float64]
+"""A drape: places (S, S, 3), metres, of a grid of material points."""
 
 
 def run(p: Drape) -> Outcome:
@@ -121,7 +100,7 @@ def _section(names: list[str], shapes: list[Shape], p: Drape) -> Plot:
     """Profiles of the drapes through the centre along the diagonal of the cloth."""
     series = []
     for k, (name, shape) in enumerate(zip(names, shapes, strict=True)):
-        places = shape.grid[np.arange(SAMPLES), np.arange(SAMPLES)]
+        places = shape[np.arange(SAMPLES), np.arange(SAMPLES)]
         reach = np.sign(np.arange(SAMPLES) - SAMPLES // 2) * np.hypot(places[:, 0], places[:, 2])
         finest = k == len(names) - 1
         series.append(Series(name, reach.tolist(), places[:, 1].tolist(), "line" if finest else "points"))
@@ -140,16 +119,13 @@ def drape(p: Drape, mesh: GarmentMesh) -> Shape:
     """The equilibrium of a sheet laid level on the sphere."""
     sim = _laid(p, mesh)
     equilibrium(sim, p.tolerance, dt=p.dt)
-    return Shape(
-        sample(mesh.panel_vertices - [0.5 * p.side, 0.0], sim.positions, p.side), sim.positions, mesh
-    )
+    return sample(p, mesh, sim)
 
 
-def sample(panel: NDArray[np.float64], positions: NDArray[np.float64], side: float) -> NDArray[np.float64]:
-    """(S, S, 3) places of a grid of material points, linear between vertices; the same points for all
-    meshes."""
-    line = np.linspace(-0.5, 0.5, SAMPLES) * side * (1.0 - 1e-9)
-    return LinearNDInterpolator(panel, positions)(*np.meshgrid(line, line, indexing="ij"))
+def sample(p: Drape, mesh: GarmentMesh, sim: ClothSimulator) -> Shape:
+    """The drape as it stands, linear between vertices; the same material points for all meshes."""
+    line = np.linspace(-0.5, 0.5, SAMPLES) * p.side * (1.0 - 1e-9)
+    return LinearNDInterpolator(centred(mesh), sim.positions)(*np.meshgrid(line, line, indexing="ij"))
 
 
 def fall(p: Drape, mesh: GarmentMesh, dt: float) -> Shape:
@@ -157,9 +133,7 @@ def fall(p: Drape, mesh: GarmentMesh, dt: float) -> Shape:
     sim = _laid(p, mesh)
     for _ in range(round(p.seconds / dt)):
         sim.advance(None, dt)
-    return Shape(
-        sample(mesh.panel_vertices - [0.5 * p.side, 0.0], sim.positions, p.side), sim.positions, mesh
-    )
+    return sample(p, mesh, sim)
 
 
 def distance(a: Shape, b: Shape) -> float:
@@ -168,18 +142,11 @@ def distance(a: Shape, b: Shape) -> float:
     Nothing but the facets of the sphere holds a sheet against turning about its centre. With w = x + i z the
     best turn is the argument of sum_k a_k conj(b_k).
     """
-    w_a, w_b = (shape.grid[..., 0] + 1j * shape.grid[..., 2] for shape in (a, b))
+    w_a, w_b = (shape[..., 0] + 1j * shape[..., 2] for shape in (a, b))
     turn = np.sum(w_a * w_b.conj())
     level_part = np.abs(w_a - w_b * turn / abs(turn)) ** 2
-    return float(np.sqrt((level_part + (a.grid[..., 1] - b.grid[..., 1]) ** 2).mean()))
+    return float(np.sqrt((level_part + (a[..., 1] - b[..., 1]) ** 2).mean()))
 
 
 def _laid(p: Drape, mesh: GarmentMesh) -> ClothSimulator:
-    contact = ContactSettings(friction_body=0.0, friction_cloth=0.0)
-    cloth = build_cloth(mesh, isotropic_fabric(p.young, p.poisson, p.thickness, p.density))
-    panel = mesh.panel_vertices - [0.5 * p.side, 0.0]
-    flat = level(panel, p.radius + START_GAP * contact.range)
-    ball = sphere(p.radius, p.sphere_subdivisions)
-    sim = ClothSimulator(cloth, flat, *ball, contact, exact(DOWN, 1.0e-8))
-    sim.pins[np.argmin(np.linalg.norm(panel, axis=1))] = True
-    return sim
+    return p.laid(mesh, friction=0.0, accuracy=1.0e-8)
