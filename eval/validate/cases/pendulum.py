@@ -44,7 +44,7 @@ def run(p: Pendulum) -> Outcome:
     """Rows: order of accuracy between the two smallest steps, energy left of a small swing."""
     outcome = Outcome()
     times = np.linspace(0.0, p.seconds, 200)
-    cloth, below = sheet(p)
+    cloth, below, _ = sheet(p)
     omega2 = GRAVITY * (cloth.mass @ below) / (cloth.mass @ below**2)
     known = exact_swing(p.amplitude, omega2, times)
     series = [Series("exact", times.tolist(), known.tolist())]
@@ -92,19 +92,19 @@ def exact_swing(amplitude: float, omega2: float, times: np.ndarray) -> np.ndarra
     return path.y[0]
 
 
-def sheet(p: Pendulum) -> tuple[ClothModel, np.ndarray]:
-    """The cloth, and the distance (V,) of its vertices from the upper edge."""
+def sheet(p: Pendulum) -> tuple[ClothModel, np.ndarray, np.ndarray]:
+    """The cloth, and the distances (V,) of its vertices from the upper edge and from the left one."""
     mesh = rectangle(0.5 * p.length, p.length, p.elements, 2 * p.elements, "structured", p.seed)
     fabric = isotropic_fabric(p.young, 0.3, p.thickness, p.density)
-    return build_cloth(mesh, fabric), p.length - mesh.panel_vertices[:, 1]
+    across, up = mesh.panel_vertices.T
+    return build_cloth(mesh, fabric), p.length - up, across
 
 
 def swing(p: Pendulum, amplitude: float, dt: float, seconds: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Times, angle at each, and the share of its energy that is left at the end."""
-    cloth, below = sheet(p)
-    mesh = rectangle(0.5 * p.length, p.length, p.elements, 2 * p.elements, "structured", p.seed)
+    cloth, below, across = sheet(p)
     x = below * np.sin(amplitude)
-    start = np.stack([x, -below * np.cos(amplitude), -mesh.panel_vertices[:, 0]], axis=1)
+    start = np.stack([x, -below * np.cos(amplitude), -across], axis=1)
     sim = alone(cloth, start, exact(DOWN))
     sim.pins[:] = below == 0.0
     lever = cloth.mass * below
