@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from muslin.garments.mesh import GarmentMesh, signed_areas
 from muslin.garments.planar import triangulate_polygon
 
-Triangulation = Literal["structured", "irregular", "oriented"]
+Triangulation = Literal["structured", "alternating", "irregular", "oriented"]
 
 JITTER = 0.3
 """Largest shift of an irregular mesh's vertices, in grid spacings."""
@@ -22,9 +22,10 @@ def rectangle(
 ) -> GarmentMesh:
     """Rectangle [0, width] x [0, length], metres, weft along x, warp along y, `across` x `along` elements.
 
-    structured: a grid, every cell cut along the same diagonal. irregular: the grid's inner vertices shifted
-    at random by up to `JITTER` of a spacing, Delaunay. oriented: nearly equilateral triangles, a hexagonal
-    lattice turned and moved at random, with edges as long as the grid's are along.
+    structured: a grid, every cell cut along the same diagonal. alternating: along one and the other by turns.
+    irregular: the grid's inner vertices shifted at random by up to `JITTER` of a spacing, Delaunay. oriented:
+    nearly equilateral triangles, a hexagonal lattice turned and moved at random, with edges as long as the
+    grid's are along.
     """
     if triangulation == "oriented":
         rng = np.random.default_rng(seed)
@@ -38,9 +39,12 @@ def rectangle(
         inner = ((column > 0) & (column < across) & (row > 0) & (row < along)).ravel()
         shift = np.random.default_rng(seed).uniform(-JITTER, JITTER, size=points.shape)
         points[inner] += (shift * [width / across, length / along])[inner]
-        return flat_mesh(points, _delaunay(points))
+        return flat_mesh(points, delaunay(points))
     a = (column * (along + 1) + row)[:-1, :-1].ravel()
     b, c, d = a + along + 1, a + along + 2, a + 1
+    if triangulation == "alternating":
+        odd = ((column + row) % 2 == 1)[:-1, :-1].ravel()
+        a, b, c, d = (np.where(odd, *ends) for ends in ((d, a), (a, b), (b, c), (c, d)))
     return flat_mesh(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
@@ -79,6 +83,15 @@ def flat_mesh(points: NDArray[np.float64], faces: NDArray[np.integer]) -> Garmen
     return mesh
 
 
+def delaunay(points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """(F, 3) counter-clockwise faces of the Delaunay triangulation of points (V, 2)."""
+    faces = Delaunay(points).simplices.astype(np.int32)
+    areas = signed_areas(points, faces)
+    faces = np.where(areas[:, None] < 0.0, faces[:, ::-1], faces)
+    # Along a straight side three vertices may count as a triangle.
+    return faces[np.abs(areas) > 1e-9 * np.abs(areas).max()]
+
+
 def _boundary(width: float, length: float, across: int, along: int) -> NDArray[np.float64]:
     """(2 (across + along), 2) boundary vertices of the grid, counter-clockwise from the origin."""
     x, y = np.linspace(0.0, width, across + 1), np.linspace(0.0, length, along + 1)
@@ -89,11 +102,3 @@ def _boundary(width: float, length: float, across: int, along: int) -> NDArray[n
         np.stack([np.zeros(along), y[:0:-1]], 1),
     ]
     return np.concatenate(sides)
-
-
-def _delaunay(points: NDArray[np.float64]) -> NDArray[np.int32]:
-    faces = Delaunay(points).simplices.astype(np.int32)
-    areas = signed_areas(points, faces)
-    faces = np.where(areas[:, None] < 0.0, faces[:, ::-1], faces)
-    # Along a straight side three vertices may count as a triangle.
-    return faces[np.abs(areas) > 1e-9 * np.abs(areas).max()]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
+from muslin.eval.validate.meshes import delaunay
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import ClothModel, build_cloth
 from muslin.sim.material import isotropic_fabric
 from tests.sim.conftest import make_flat_mesh
-from tests.sim.meshes import KINDS, sheet
+from tests.sim.meshes import KINDS, Kind, sheet
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def quadratic(places: Array, tensor: Array) -> Array:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_quadratics_have_their_curvature_in_every_triangle(kind: str, seed: int) -> None:
+def test_quadratics_have_their_curvature_in_every_triangle(kind: Kind, seed: int) -> None:
     mesh = sheet(kind, 0.5, 0.4, 0.05, seed)
     cloth = build_cloth(mesh, FABRIC)
     places = corner_places(mesh, cloth)
@@ -92,7 +92,7 @@ def test_a_triangle_alone_has_no_curvature() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_constant_moments_do_the_work_of_the_folded_sheet(kind: str) -> None:
+def test_constant_moments_do_the_work_of_the_folded_sheet(kind: Kind) -> None:
     """sum A K = sum l theta n n^T for any folds that stay clear of the border: the patch test."""
     mesh = sheet(kind, 0.5, 0.4, 0.04, 1)
     cloth = build_cloth(mesh, FABRIC)
@@ -110,7 +110,7 @@ def test_constant_moments_do_the_work_of_the_folded_sheet(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_only_flat_hinges_have_no_curvature(kind: str) -> None:
+def test_only_flat_hinges_have_no_curvature(kind: Kind) -> None:
     mesh = sheet(kind, 0.4, 0.3, 0.05, 2)
     cloth = build_cloth(mesh, FABRIC)
     places = corner_places(mesh, cloth)
@@ -128,7 +128,7 @@ def test_needles_and_conics_stay_bounded() -> None:
     angles = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     points = 0.05 * np.concatenate([ring, 2.2 * ring @ np.array([[0.0, 1.0], [-1.0, 0.0]])])
-    mesh = make_flat_mesh(points, _delaunay(points))
+    mesh = make_flat_mesh(points, delaunay(points))
     cloth = build_cloth(mesh, FABRIC)
     places = corner_places(mesh, cloth)
     found = operator(cloth) @ small_angles(places, quadratic(places, TENSORS[3]))
@@ -162,10 +162,3 @@ def test_seams_are_unfolded_into_each_panels_frame() -> None:
     turned = rotation @ tensor @ rotation.T
     expected = np.where(second[:, None], [turned[1, 1], turned[0, 0], turned[0, 1]], TENSORS[3])
     np.testing.assert_allclose(operator(cloth) @ angle, expected, atol=1e-9)
-
-
-def _delaunay(points: Array) -> NDArray[np.int32]:
-    faces = Delaunay(points).simplices
-    u, v = points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    return np.where(area[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(area) > 1e-9]

@@ -24,7 +24,7 @@ from muslin.sim.material import Fabric, fabric_names, isotropic_fabric, load_fab
 from muslin.sim.solve.linear import LinearSystem
 from tests.sim.conftest import make_flat_mesh
 from tests.sim.dense import dense
-from tests.sim.meshes import KINDS, sheet
+from tests.sim.meshes import KINDS, Kind, sheet
 
 Array = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def test_angle_is_signed_and_blind_to_strain() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0, 90.0, 130.0])
-def test_cylinders_cost_what_the_table_says_on_any_triangulation(kind: str, degrees: float) -> None:
+def test_cylinders_cost_what_the_table_says_on_any_triangulation(kind: Kind, degrees: float) -> None:
     mesh = sheet(kind, 0.2, 0.15, 0.01, 1)
     for fabric in (load_fabric("11oz-black-denim"), load_fabric("gray-interlock"), ISOTROPIC):
         bending = Bending(build_cloth(mesh, fabric))
@@ -165,7 +165,7 @@ def test_cylinders_cost_what_the_table_says_on_any_triangulation(kind: str, degr
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_cylinders_converge_with_the_square_of_the_side(kind: str) -> None:
+def test_cylinders_converge_with_the_square_of_the_side(kind: Kind) -> None:
     errors = []
     for side in (0.02, 0.01):
         mesh = sheet(kind, 0.2, 0.16, side, 1)
@@ -196,7 +196,7 @@ def test_rolled_along_the_measured_directions_the_table_is_reproduced(fabric: Fa
 @pytest.mark.parametrize(
     "tensor", [(1.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.8, -0.3, 0.5)]
 )
-def test_isotropic_sheet_is_the_plate(kind: str, tensor: tuple[float, float, float]) -> None:
+def test_isotropic_sheet_is_the_plate(kind: Kind, tensor: tuple[float, float, float]) -> None:
     """B / 2 (tr(K)^2 - 2 (1 - nu) det K): cylinder, saddle, cap, twist and a mixture."""
     mesh = sheet(kind, 0.2, 0.15, 0.02, 2)
     bending = Bending(build_cloth(mesh, ISOTROPIC))
@@ -259,7 +259,7 @@ def test_hessian_is_symmetric_and_positive_semi_definite(patch: Bending) -> None
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_hessian_is_near_enough_for_newton_to_converge_where_flat(kind: str) -> None:
+def test_hessian_is_near_enough_for_newton_to_converge_where_flat(kind: Kind) -> None:
     """Newton with H' in place of H converges where all eigenvalues of H against H' are below 2."""
     mesh = sheet(kind, 0.08, 0.06, 0.01, 4)
     bending = Bending(build_cloth(mesh, ISOTROPIC))
