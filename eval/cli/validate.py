@@ -59,10 +59,10 @@ def validate(
         for finding in run_cases(cases, update):
             findings.append(finding)
             for row in rows_of(finding):
-                verdict = "pass" if row["passed"] else "FAIL"
-                unit = "" if row["unit"] == "1" else f" {row['unit']}"
-                figures = f"{number(row['measured'], 5)}{unit}, known {number(row['expected'], 5)}"
-                typer.echo(f"{verdict}  {row['name']}: {figures}")
+                verdict = "pass" if row.passed else "FAIL"
+                unit = "" if row.unit == "1" else f" {row.unit}"
+                figures = f"{number(row.measured, 5)}{unit}, known {number(row.expected, 5)}"
+                typer.echo(f"{verdict}  {row.name}: {figures}")
             if finding.error:
                 typer.echo(f"muslin: {finding.name}: {finding.error}", err=True)
     if json_file is not None:

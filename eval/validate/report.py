@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from muslin.eval.page import column, duration, number, render_page, tile, write_atomically
+from muslin.eval.validate.case import Row
 from muslin.eval.validate.plots import plot_png, plot_svg
 from muslin.eval.validate.runner import Finding, rows_of
 
@@ -24,7 +25,7 @@ COLUMNS = [
 def validation_report(findings: Sequence[Finding], small: bool) -> str:
     """HTML: totals, then for each case its rows and plots."""
     rows = [row for finding in findings for row in rows_of(finding)]
-    failed = sum(not row["passed"] for row in rows)
+    failed = sum(not row.passed for row in rows)
     return render_page(
         "validation.html.j2",
         title="muslin: validation",
@@ -60,17 +61,14 @@ def _case(finding: Finding) -> dict[str, object]:
     }
 
 
-def _cells(row: dict) -> list[str]:
-    relative = row["kind"] == "relative"
-    deviation = abs(row["measured"] - row["expected"])
-    bar = f"{100.0 * row['bar']:g} %" if relative else f"{row['bar']:g}"
-    share = deviation / abs(row["expected"]) if relative else deviation
+def _cells(row: Row) -> list[str]:
+    relative = row.kind == "relative"
     return [
-        row["name"],
-        number(row["measured"], 5),
-        number(row["expected"], 5),
-        f"{100.0 * share:.2g} %" if relative else f"{share:.2g}",
-        bar,
-        "" if row["unit"] == "1" else row["unit"],
-        "passes" if row["passed"] else "FAILS",
+        row.name,
+        number(row.measured, 5),
+        number(row.expected, 5),
+        f"{100.0 * row.deviation:.2g} %" if relative else f"{row.deviation:.2g}",
+        f"{100.0 * row.bar:g} %" if relative else f"{row.bar:g}",
+        "" if row.unit == "1" else row.unit,
+        "passes" if row.passed else "FAILS",
     ]

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from muslin.eval.page import write_atomically
 from muslin.eval.validate.case import Outcome, Row
@@ -52,19 +51,18 @@ def run_cases(
         yield Finding(case.name, case.table.title, outcome, seconds, error)
 
 
-def rows_of(finding: Finding) -> list[dict[str, Any]]:
-    """The rows as JSON holds them; a case without rows is one row that fails."""
-    rows = finding.outcome.rows
+def rows_of(finding: Finding) -> list[Row]:
+    """The rows; a case that did not run to its end has one that fails."""
     if finding.error:
-        rows = [*rows, Row(f"{finding.name}: runs to its end", 0.0, 1.0, 0.0, "absolute")]
-    return [{"case": finding.name, **row.as_dict()} for row in rows]
+        return [*finding.outcome.rows, Row(f"{finding.name}: runs to its end", 0.0, 1.0, 0.0, "absolute")]
+    return finding.outcome.rows
 
 
 def write_json(path: Path, findings: Sequence[Finding], small: bool) -> None:
     """Write {"rows": [...]} with versions and times beside it. Raises InputError where it cannot be
     written."""
     result = {
-        "rows": [row for finding in findings for row in rows_of(finding)],
+        "rows": [{"case": finding.name, **row.as_dict()} for finding in findings for row in rows_of(finding)],
         "small": small,
         "seconds": {finding.name: finding.seconds for finding in findings},
         "errors": {finding.name: finding.error for finding in findings if finding.error},
