@@ -186,7 +186,7 @@ def _sequence(
 ) -> Sample:
     assert scene.motion is not None
     m = scene.motion
-    substeps = int(np.ceil(1.0 / (m.fps * scene.solver.dt) - 1e-9))
+    substeps = scene.solver.substeps(m.fps)
     step_rate = m.fps * substeps
     way_in = lead_in(clip, LEAD_IN_SECONDS, step_rate)
     worn.carry(way_in.poses[0], way_in.translations[0])

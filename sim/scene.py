@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -113,6 +114,10 @@ class SolverTable(Table):
     contact_stiffness: Positive = 1.0
     settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 150
     settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 1.0e-4
+
+    def substeps(self, fps: float) -> int:
+        """The fewest equal steps of at most `dt` in a frame of 1 / `fps` seconds."""
+        return math.ceil(1.0 / (fps * self.dt) - 1e-9)
 
 
 class ExpectTable(Table):

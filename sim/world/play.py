@@ -106,8 +106,8 @@ class _Stage:
     def run(self, tick: Tick) -> list[_Frame]:
         """All frames of the sequence; the first is the beginning."""
         assert self.scene.sequence is not None
-        fps, dt = self.scene.sequence.fps, self.scene.solver.dt
-        substeps = int(np.ceil(1.0 / (fps * dt) - 1e-9))
+        fps = self.scene.sequence.fps
+        substeps = self.scene.solver.substeps(fps)
         frames = [self.frame(0.0)]
         for frame in range(1, 1 + int(np.floor(self.scene.sequence.duration * fps + 1e-6))):
             self.sim.work_left = self.scene.solver.max_work

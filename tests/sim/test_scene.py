@@ -3,7 +3,7 @@
 import pytest
 
 from muslin.garments.errors import InputError
-from muslin.sim.scene import Scene, load_scene, parse_scene
+from muslin.sim.scene import Scene, SolverTable, load_scene, parse_scene
 
 MINIMAL = '[body]\nmodel = "female"\n'
 
@@ -199,3 +199,17 @@ def test_scenes_cannot_be_changed():
     assert isinstance(scene, Scene)
     with pytest.raises(ValueError, match="frozen"):
         scene.seed = 3
+
+
+@pytest.mark.parametrize(
+    ("dt", "fps", "steps"),
+    [
+        (1.0 / 60.0, 30.0, 2),
+        (1.0 / 60.0, 60.0, 1),
+        (1.0 / 60.0, 25.0, 3),
+        (0.05, 240.0, 1),
+        (1e-3, 30.0, 34),
+    ],
+)
+def test_a_frame_has_the_fewest_steps_of_at_most_dt(dt: float, fps: float, steps: int) -> None:
+    assert SolverTable(dt=dt).substeps(fps) == steps
