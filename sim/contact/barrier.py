@@ -15,7 +15,6 @@ IPC" (area weights).
 
 import warp as wp
 
-from muslin.sim.contact.broad_phase import way_together
 from muslin.sim.contact.distance import pair_difference, pair_weights
 from muslin.sim.solve.block_matrix import BlockMatrix, add_pair
 
@@ -87,39 +86,41 @@ def pair_area(is_edge_edge: bool, pair: wp.vec4i, measure: PairMeasure) -> wp.fl
         # An edge owns about a third of the area around each of its ends.
         own = area[pair[0]] + area[pair[1]]
         if pair[2] >= n:
-            return own * wp.float64(1.0 / 6.0)
-        return (own + area[pair[2]] + area[pair[3]]) * wp.float64(1.0 / 12.0)
+            return own * (wp.float64(1.0) / wp.float64(6.0))
+        return (own + area[pair[2]] + area[pair[3]]) * (wp.float64(1.0) / wp.float64(12.0))
     if pair[0] >= n:
-        return (area[pair[1]] + area[pair[2]] + area[pair[3]]) * wp.float64(1.0 / 6.0)
+        return (area[pair[1]] + area[pair[2]] + area[pair[3]]) * (wp.float64(1.0) / wp.float64(6.0))
     return wp.float64(0.5) * area[pair[0]]
 
 
 @wp.kernel
 def barrier_value(
     x: wp.array(dtype=wp.vec3d),
-    way: wp.array(dtype=wp.float64),
     step: wp.float64,
     reference: wp.array(dtype=wp.vec3d),
     pairs: wp.array(dtype=wp.vec4i),
+    owner: wp.array(dtype=wp.int32),
+    most: wp.array(dtype=wp.float64),
     distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
     measure: PairMeasure,
     out_distance: wp.array(dtype=wp.float64),
     energy: wp.array(dtype=wp.float64),
 ):
-    """energy[0] += sum of barrier energies at x, the end of a move of no more than `step` `way`.
+    """energy[0] += sum of barrier energies at x, the end of a move.
 
-    `distance` bounds the distances before the move from below, `out_distance` after it: pairs that cannot
-    have come within range are not measured. `reference` (start of the step) gives the lengths in c0.
+    No pair has come together by more than `step` times the `most` of its owner. `distance` bounds the
+    distances before the move from below, `out_distance` after it: pairs that cannot have come within range
+    are not measured. `reference` (start of the step) gives the lengths in c0.
     """
     k = wp.tid()
-    pair = pairs[k]
     bound = distance[k]
     if bound > measure.range_:
-        bound = bound - step * way_together(is_edge_edge, pair, way)
+        bound -= step * most[owner[k]]
         if bound > measure.range_:
             out_distance[k] = bound
             return
+    pair = pairs[k]
     d = wp.length(difference(closest(is_edge_edge, pair, x), pair, x))
     out_distance[k] = d
     s = d / measure.range_
@@ -127,6 +128,18 @@ def barrier_value(
         m = mollifier(is_edge_edge, pair, x, reference)[0]
         scale = measure.stiffness * pair_area(is_edge_edge, pair, measure)
         wp.atomic_add(energy, 0, scale * m * barrier(s)[0])
+
+
+@wp.kernel
+def lower_distances(
+    step: wp.float64,
+    owner: wp.array(dtype=wp.int32),
+    most: wp.array(dtype=wp.float64),
+    distance: wp.array(dtype=wp.float64),
+):
+    """`distance` bounds the distances from below also after `step` of a move, as in `barrier_value`."""
+    k = wp.tid()
+    distance[k] = wp.max(distance[k] - step * most[owner[k]], wp.float64(0.0))
 
 
 @wp.kernel

@@ -1,23 +1,20 @@
-"""Pairs that may come near each other on the way, as Warp kernels: swept boxes first, distances then.
+"""Which patches and groups may come near each other, as Warp kernels.
 
-Vertices of the cloth come first in the joint array X, collider vertices after them. Every pair has at
-least one cloth vertex; pairs that share a vertex are left out. Vertex i moves by anything between b_i and
-p_i. Boxes of these ways are float32 and padded outwards by more than their rounding. Of the pairs whose boxes
-overlap those are kept whose distance now is less than `radius` and what the two sides can move towards each
-other, their common motion taken away: most neighbours in a sheet overlap, and few can touch.
-
-Primitives with a `hot` vertex are looked for, those without one are what they were when they were looked for
-last. Only vertices of the cloth are ever hot.
+Two patches that may come near each other are opened: their groups become pairs of groups. The primitives of
+two groups that may come near are looked at one by one (`muslin.sim.contact.narrow_phase`).
 """
 
 import warp as wp
 
-from muslin.sim.contact.distance import pair_distance
-
 wp.set_module_options({"enable_backward": False})
 
-PADDING = 1.0e-5
-"""Metres added to every box against float32 rounding; holds for scenes within 50 m of the origin."""
+
+@wp.struct
+class Boxes:
+    """Boxes of so many things."""
+
+    low: wp.array(dtype=wp.vec3d)
+    high: wp.array(dtype=wp.vec3d)
 
 
 @wp.func
@@ -31,267 +28,118 @@ def box_high(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
 
 
 @wp.func
-def to_single(a: wp.vec3d, pad: wp.float64) -> wp.vec3:
-    return wp.vec3(wp.float32(a[0] + pad), wp.float32(a[1] + pad), wp.float32(a[2] + pad))
-
-
-@wp.func
-def way_together(is_edge_edge: bool, pair: wp.vec4i, way: wp.array(dtype=wp.float64)) -> wp.float64:
-    """What two sides whose vertices go no further than `way` can at most move towards each other, m."""
-    if is_edge_edge:
-        return wp.max(way[pair[0]], way[pair[1]]) + wp.max(way[pair[2]], way[pair[3]])
-    return way[pair[0]] + wp.max(way[pair[1]], wp.max(way[pair[2]], way[pair[3]]))
-
-
-@wp.func
-def apart(is_edge_edge: bool, x0: wp.vec3d, x1: wp.vec3d, x2: wp.vec3d, x3: wp.vec3d, d: wp.float64) -> bool:
-    """True only if a pair is further apart than d: by their extents along the line between their centres.
-
-    Much cheaper than the distance, and enough for most of those neighbours in a sheet that are near by box.
-    """
-    half = wp.float64(0.5)
-    if is_edge_edge:
-        m = (x2 + x3 - x0 - x1) * half
-        extent = (wp.abs(wp.dot(m, x1 - x0)) + wp.abs(wp.dot(m, x3 - x2))) * half
-        square = wp.length_sq(m)
-        gap = square - extent
-        return gap > wp.float64(0.0) and gap * gap > d * d * square
-    m = x0 - (x1 + x2 + x3) / wp.float64(3.0)
-    square = wp.length_sq(m)
-    nearest = wp.max(wp.dot(m, x1 - x0), wp.max(wp.dot(m, x2 - x0), wp.dot(m, x3 - x0)))
-    return nearest < wp.float64(0.0) and nearest * nearest > d * d * square
-
-
-@wp.func
-def pair_reach(
-    is_edge_edge: bool, pair: wp.vec4i, b: wp.array(dtype=wp.vec3d), p: wp.array(dtype=wp.vec3d)
-) -> wp.float64:
-    """What the two sides of a pair can at most move towards each other, m."""
-    m = (p[pair[0]] + p[pair[1]] + p[pair[2]] + p[pair[3]]) * wp.float64(0.25)
-    r0 = wp.max(wp.length_sq(p[pair[0]] - m), wp.length_sq(b[pair[0]] - m))
-    r1 = wp.max(wp.length_sq(p[pair[1]] - m), wp.length_sq(b[pair[1]] - m))
-    r2 = wp.max(wp.length_sq(p[pair[2]] - m), wp.length_sq(b[pair[2]] - m))
-    r3 = wp.max(wp.length_sq(p[pair[3]] - m), wp.length_sq(b[pair[3]] - m))
-    if is_edge_edge:
-        return wp.sqrt(wp.max(r0, r1)) + wp.sqrt(wp.max(r2, r3))
-    return wp.sqrt(r0) + wp.sqrt(wp.max(r1, wp.max(r2, r3)))
+def gap_between(low: wp.vec3d, high: wp.vec3d, other_low: wp.vec3d, other_high: wp.vec3d) -> wp.float64:
+    """Distance of two boxes, m."""
+    between = box_high(low - other_high, other_low - high)
+    return wp.length(box_high(between, wp.vec3d()))
 
 
 @wp.kernel
-def sweep_vertices(
+def boxes_of_points(
+    wanted: wp.array(dtype=wp.int32),
+    offsets: wp.array(dtype=wp.int32),
+    rows: wp.array2d(dtype=wp.int32),
     x: wp.array(dtype=wp.vec3d),
-    b: wp.array(dtype=wp.vec3d),
-    p: wp.array(dtype=wp.vec3d),
-    shift: wp.vec3d,
-    low: wp.array(dtype=wp.vec3d),
-    high: wp.array(dtype=wp.vec3d),
+    boxes: Boxes,
 ):
-    """Box of each vertex around x, x + b - shift and x + p - shift.
-
-    Whether two points come together does not depend on a motion they share, so the sweep may leave one out.
-    """
-    i = wp.tid()
-    a = x[i]
-    end = a + p[i] - shift
-    other = a + b[i] - shift
-    low[i] = box_low(a, box_low(end, other))
-    high[i] = box_high(a, box_high(end, other))
-
-
-@wp.kernel
-def element_bounds(
-    elements: wp.array2d(dtype=wp.int32),
-    vertex_low: wp.array(dtype=wp.vec3d),
-    vertex_high: wp.array(dtype=wp.vec3d),
-    low: wp.array(dtype=wp.vec3),
-    high: wp.array(dtype=wp.vec3),
-):
-    """Box of each triangle or edge."""
-    i = wp.tid()
-    a = vertex_low[elements[i, 0]]
-    b = vertex_high[elements[i, 0]]
-    for k in range(1, elements.shape[1]):
-        a = box_low(a, vertex_low[elements[i, k]])
-        b = box_high(b, vertex_high[elements[i, k]])
-    pad = wp.float64(PADDING)
-    low[i] = to_single(a, -pad)
-    high[i] = to_single(b, pad)
-
-
-@wp.kernel
-def spend(
-    b: wp.array(dtype=wp.vec3d),
-    p: wp.array(dtype=wp.vec3d),
-    shared: wp.vec3d,
-    num_cloth: int,
-    budget: wp.float64,
-    way: wp.array(dtype=wp.float64),
-    travelled: wp.array(dtype=wp.float64),
-    hot: wp.array(dtype=wp.int32),
-    count: wp.array(dtype=wp.int32),
-):
-    """The way of each vertex, added to what it has travelled.
-
-    Hot is who has gone further than `budget`: count = [of cloth, of collider].
-    """
-    i = wp.tid()
-    far = wp.sqrt(wp.max(wp.length_sq(p[i] - shared), wp.length_sq(b[i] - shared)))
-    way[i] = far
-    far += travelled[i]
-    travelled[i] = far
-    hot[i] = 0
-    if far > budget:
-        if i < num_cloth:
-            hot[i] = 1
-            wp.atomic_add(count, 0, 1)
-        else:
-            wp.atomic_add(count, 1, 1)
-
-
-@wp.kernel
-def rest(hot: wp.array(dtype=wp.int32), travelled: wp.array(dtype=wp.float64)):
-    """Vertices that have been looked for start again from no way."""
-    i = wp.tid()
-    if hot[i] != 0:
-        travelled[i] = wp.float64(0.0)
-
-
-@wp.kernel
-def keep_cold_pairs(
-    pairs: wp.array(dtype=wp.vec4i),
-    distance: wp.array(dtype=wp.float64),
-    hot: wp.array(dtype=wp.int32),
-    count: wp.array(dtype=wp.int32),
-    out: wp.array(dtype=wp.vec4i),
-    out_distance: wp.array(dtype=wp.float64),
-):
-    """Copies the pairs without a hot vertex."""
+    """Box of each `wanted` set of vertices at x."""
     k = wp.tid()
-    i = pairs[k]
-    if hot[i[0]] + hot[i[1]] + hot[i[2]] + hot[i[3]] == 0:
-        slot = wp.atomic_add(count, 0, 1)
-        out[slot] = i
-        out_distance[slot] = distance[k]
+    if wanted[k] == 0:
+        return
+    begin = offsets[k]
+    low = x[rows[begin, 0]]
+    high = low
+    for j in range(begin + 1, offsets[k + 1]):
+        a = x[rows[j, 0]]
+        low = box_low(low, a)
+        high = box_high(high, a)
+    boxes.low[k] = low
+    boxes.high[k] = high
 
 
-@wp.struct
-class Ways:
-    """Where vertices are, x, what they may move by, from b to p, their boxes, how far they go beside what all
-    have in common, and who is hot."""
-
-    x: wp.array(dtype=wp.vec3d)
-    b: wp.array(dtype=wp.vec3d)
-    p: wp.array(dtype=wp.vec3d)
-    low: wp.array(dtype=wp.vec3d)
-    high: wp.array(dtype=wp.vec3d)
-    way: wp.array(dtype=wp.float64)
-    hot: wp.array(dtype=wp.int32)
-
-
-@wp.func
-def append_if_near(
-    is_edge_edge: bool,
-    pair: wp.vec4i,
-    ways: Ways,
-    radius: wp.float64,
-    count: wp.array(dtype=wp.int32),
-    pairs: wp.array(dtype=wp.vec4i),
-    distance: wp.array(dtype=wp.float64),
+@wp.kernel
+def boxes_of_primitives(
+    wanted: wp.array(dtype=wp.int32),
+    offsets: wp.array(dtype=wp.int32),
+    rows: wp.array2d(dtype=wp.int32),
+    x: wp.array(dtype=wp.vec3d),
+    boxes: Boxes,
 ):
-    """Appends a pair that can come nearer than `radius` on its way.
+    """Box of each primitive of `wanted` groups at x."""
+    k = wp.tid()
+    if wanted[k] == 0:
+        return
+    for j in range(offsets[k], offsets[k + 1]):
+        low = x[rows[j, 0]]
+        high = low
+        for i in range(1, rows.shape[1]):
+            a = x[rows[j, i]]
+            low = box_low(low, a)
+            high = box_high(high, a)
+        boxes.low[j] = low
+        boxes.high[j] = high
 
-    `count` goes on past the capacity of `pairs`, so that the caller sees by how much it was too short.
+
+@wp.kernel
+def open_patches(
+    hot_pairs: wp.array(dtype=wp.int32),
+    num_patches: int,
+    boxes: Boxes,
+    group_offsets: wp.array(dtype=wp.int32),
+    range_: wp.float64,
+    ahead: wp.float64,
+    slack: wp.array(dtype=wp.float64),
+    cost: wp.array(dtype=wp.float64),
+    opened: wp.array(dtype=wp.int32),
+    count: wp.array(dtype=wp.int32),
+    groups: wp.array(dtype=wp.vec2i),
+    group_slack: wp.array(dtype=wp.float64),
+):
+    """Append the pairs of groups of those hot patches that will be within `ahead` of each other's range.
+
+    The others get the slack that they have.
     """
-    x0 = ways.x[pair[0]]
-    x1 = ways.x[pair[1]]
-    x2 = ways.x[pair[2]]
-    x3 = ways.x[pair[3]]
-    if apart(is_edge_edge, x0, x1, x2, x3, radius + way_together(is_edge_edge, pair, ways.way)):
+    ab = hot_pairs[wp.tid()]
+    a = ab // num_patches
+    b = ab - a * num_patches
+    left = gap_between(boxes.low[a], boxes.high[a], boxes.low[b], boxes.high[b]) - range_
+    if left > cost[ab] + ahead:
+        slack[ab] = left
         return
-    d = pair_distance(is_edge_edge, x0, x1, x2, x3)
-    if d < radius or d < radius + pair_reach(is_edge_edge, pair, ways.b, ways.p):
-        slot = wp.atomic_add(count, 0, 1)
-        if slot < pairs.shape[0]:
-            pairs[slot] = pair
-            distance[slot] = d
+    opened[ab] = 1
+    for g in range(group_offsets[a], group_offsets[a + 1]):
+        first = group_offsets[b]
+        if a == b:
+            first = g
+        last = group_offsets[b + 1]
+        slot = wp.atomic_add(count, 0, last - first)
+        if slot + last - first <= groups.shape[0]:
+            for h in range(first, last):
+                groups[slot + h - first] = wp.vec2i(g, h)
+                # Less than nothing: to be looked at.
+                group_slack[slot + h - first] = wp.float64(-1.0)
 
 
 @wp.kernel
-def faces_near_hot_vertices(
-    bvh: wp.uint64,
-    faces: wp.array2d(dtype=wp.int32),
-    ways: Ways,
-    radius: wp.float64,
-    count: wp.array(dtype=wp.int32),
-    pairs: wp.array(dtype=wp.vec4i),
-    distance: wp.array(dtype=wp.float64),
+def renew_slack(
+    hot_pairs: wp.array(dtype=wp.int32),
+    groups: wp.array(dtype=wp.vec2i),
+    boxes: Boxes,
+    range_: wp.float64,
+    margin: wp.float64,
+    slack: wp.array(dtype=wp.float64),
+    cost: wp.array(dtype=wp.float64),
 ):
-    """Appends (v, f0, f1, f2) for every hot vertex and the faces near it."""
-    v = wp.tid()
-    if ways.hot[v] == 0:
-        return
-    query = wp.bvh_query_aabb(bvh, to_single(ways.low[v], -radius), to_single(ways.high[v], radius))
-    f = int(0)
-    while wp.bvh_query_next(query, f):
-        pair = wp.vec4i(v, faces[f, 0], faces[f, 1], faces[f, 2])
-        if pair[1] != v and pair[2] != v and pair[3] != v:
-            append_if_near(False, pair, ways, radius, count, pairs, distance)
+    """How far apart beyond `range_` the primitives of two hot groups are that were not listed.
 
-
-@wp.kernel
-def vertices_near_hot_faces(
-    bvh: wp.uint64,
-    first: int,
-    faces: wp.array2d(dtype=wp.int32),
-    ways: Ways,
-    radius: wp.float64,
-    count: wp.array(dtype=wp.int32),
-    pairs: wp.array(dtype=wp.vec4i),
-    distance: wp.array(dtype=wp.float64),
-):
-    """Appends (v, f0, f1, f2) for every hot face and cold vertices near it; `first`: the BVH's vertex 0."""
-    f = wp.tid()
-    a = faces[f, 0]
-    b = faces[f, 1]
-    c = faces[f, 2]
-    if ways.hot[a] + ways.hot[b] + ways.hot[c] == 0:
-        return
-    low = box_low(ways.low[a], box_low(ways.low[b], ways.low[c]))
-    high = box_high(ways.high[a], box_high(ways.high[b], ways.high[c]))
-    query = wp.bvh_query_aabb(bvh, to_single(low, -radius), to_single(high, radius))
-    k = int(0)
-    while wp.bvh_query_next(query, k):
-        v = first + k
-        if ways.hot[v] == 0 and a != v and b != v and c != v:
-            append_if_near(False, wp.vec4i(v, a, b, c), ways, radius, count, pairs, distance)
-
-
-@wp.kernel
-def edges_near_hot_edges(
-    bvh: wp.uint64,
-    queries: wp.array2d(dtype=wp.int32),
-    edges: wp.array2d(dtype=wp.int32),
-    same_set: int,
-    ways: Ways,
-    radius: wp.float64,
-    count: wp.array(dtype=wp.int32),
-    pairs: wp.array(dtype=wp.vec4i),
-    distance: wp.array(dtype=wp.float64),
-):
-    """Appends (a0, a1, b0, b1) for every hot edge and the edges near it; with `same_set` each pair once."""
-    i = wp.tid()
-    a0 = queries[i, 0]
-    a1 = queries[i, 1]
-    if ways.hot[a0] + ways.hot[a1] == 0:
-        return
-    low = box_low(ways.low[a0], ways.low[a1])
-    high = box_high(ways.high[a0], ways.high[a1])
-    query = wp.bvh_query_aabb(bvh, to_single(low, -radius), to_single(high, radius))
-    e = int(0)
-    while wp.bvh_query_next(query, e):
-        b0 = edges[e, 0]
-        b1 = edges[e, 1]
-        if same_set == 1 and e <= i and ways.hot[b0] + ways.hot[b1] > 0:
-            continue
-        if a0 != b0 and a0 != b1 and a1 != b0 and a1 != b1:
-            append_if_near(True, wp.vec4i(a0, a1, b0, b1), ways, radius, count, pairs, distance)
+    Groups out of reach have none listed; those within reach are `margin` apart also after the move.
+    """
+    owner = hot_pairs[wp.tid()]
+    g = groups[owner][0]
+    h = groups[owner][1]
+    left = gap_between(boxes.low[g], boxes.high[g], boxes.low[h], boxes.high[h]) - range_
+    if left >= margin + cost[owner]:
+        slack[owner] = left
+    else:
+        slack[owner] = margin
+        cost[owner] = wp.float64(0.0)

@@ -13,7 +13,6 @@ Source: Li, Kaufman, Jiang 2021, "Codimensional incremental potential contact", 
 
 import warp as wp
 
-from muslin.sim.contact.broad_phase import way_together
 from muslin.sim.contact.distance import pair_distance
 
 wp.set_module_options({"enable_backward": False})
@@ -105,10 +104,12 @@ def cut_fractions(
     x: wp.array(dtype=wp.vec3d),
     b: wp.array(dtype=wp.vec3d),
     p: wp.array(dtype=wp.vec3d),
-    way: wp.array(dtype=wp.float64),
     pairs: wp.array(dtype=wp.vec4i),
+    owner: wp.array(dtype=wp.int32),
+    most: wp.array(dtype=wp.float64),
     distance: wp.array(dtype=wp.float64),
     is_edge_edge: bool,
+    first: bool,
     before: wp.array(dtype=wp.float64),
     fraction: wp.array(dtype=wp.float64),
     out: wp.array(dtype=wp.float64),
@@ -116,26 +117,27 @@ def cut_fractions(
 ):
     """Of every pair that is not safe on x + b + f (p - b), the f of its vertices go down with its safe step.
 
-    `fraction` f (V + N,) is read; pairs whose vertices have it from `before` are known to be safe.
-    `out` starts as a copy of f; cut[0] counts the pairs. `distance` bounds those at x from below, `way` the
-    moves from above.
+    In the `first` pass all go p, and no pair comes together by more than the `most` of its owner from its
+    `distance` or more. Later `fraction` f (V + N,) is read, and pairs whose vertices have it from `before`
+    are known to be safe. `out` starts as a copy of f; cut[0] counts the pairs.
     """
     k = wp.tid()
+    if first and (wp.float64(1.0) - wp.float64(GAP)) * distance[k] > most[owner[k]]:
+        return
     i = pairs[k]
-    same = int(0)
-    for j in range(int(0), int(4)):
-        if before[i[j]] == fraction[i[j]]:
-            same += 1
-    if same == 4:
+    i0 = i[0]
+    i1 = i[1]
+    i2 = i[2]
+    i3 = i[3]
+    same = before[i0] == fraction[i0] and before[i1] == fraction[i1]
+    if same and before[i2] == fraction[i2] and before[i3] == fraction[i3]:
         return
-    if (wp.float64(1.0) - wp.float64(GAP)) * distance[k] > way_together(is_edge_edge, i, way):
-        return
-    m0 = part_of_way(b[i[0]], p[i[0]], fraction[i[0]])
-    m1 = part_of_way(b[i[1]], p[i[1]], fraction[i[1]])
-    m2 = part_of_way(b[i[2]], p[i[2]], fraction[i[2]])
-    m3 = part_of_way(b[i[3]], p[i[3]], fraction[i[3]])
+    m0 = part_of_way(b[i0], p[i0], fraction[i0])
+    m1 = part_of_way(b[i1], p[i1], fraction[i1])
+    m2 = part_of_way(b[i2], p[i2], fraction[i2])
+    m3 = part_of_way(b[i3], p[i3], fraction[i3])
     one = wp.float64(1.0)
-    t = advance_pair(is_edge_edge, x[i[0]], x[i[1]], x[i[2]], x[i[3]], m0, m1, m2, m3, one)
+    t = advance_pair(is_edge_edge, x[i0], x[i1], x[i2], x[i3], m0, m1, m2, m3, one)
     if t < one:
         wp.atomic_add(cut, 0, 1)
         for j in range(int(0), int(4)):

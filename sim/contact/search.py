@@ -2,227 +2,239 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.broad_phase import (
-    Ways,
-    edges_near_hot_edges,
-    element_bounds,
-    faces_near_hot_vertices,
-    keep_cold_pairs,
-    rest,
-    spend,
-    sweep_vertices,
-    vertices_near_hot_faces,
+    Boxes,
+    boxes_of_points,
+    boxes_of_primitives,
+    open_patches,
+    renew_slack,
 )
+from muslin.sim.contact.narrow_phase import GroupPrimitives, find_near_edges, find_near_faces
+from muslin.sim.contact.pair_list import PairList
+from muslin.sim.contact.patch_motion import (
+    SetMotion,
+    find_hot_groups,
+    find_hot_patches,
+    split_motions,
+)
+from muslin.sim.contact.patches import Patches, Rows, cut_into_patches
 
-REBUILD_EVERY = 50
-"""Searches after which the bounding volume hierarchies are built anew; in between they are refitted."""
+AHEAD = 0.005
+"""Metres beyond the range within which patches are opened before they must be."""
 
-MOST_HOT = 0.3
-"""Share of hot vertices from which on all are looked for at once."""
+MORE = 1.5
+"""Growth of the pairs of groups since they were made anew from which on they are made anew."""
 
 
-class PairList:
-    """Growing list of vertex quadruples; the length is known on the host after a search.
+class _Sets:
+    """Patches or groups: the vertices that their primitives touch, how these move, and the boxes of those
+    that are wanted."""
 
-    `distance`: a lower bound of each pair's distance, metres, exact where it is less than the contact range;
-    `trial`: the same for a trial position.
+    def __init__(self, touched: Rows, device: str) -> None:
+        self.device = device
+        self.count = len(touched.offsets) - 1
+        self.rows = [_integers(touched.offsets, device), _integers(touched.rows, device)]
+        self.wanted = wp.zeros(self.count, dtype=wp.int32, device=device)
+        self.boxes = _boxes(self.count, device)
+        self.motion = SetMotion()
+        for name in ("centre", "mean", "spin"):
+            setattr(self.motion, name, wp.zeros(self.count, dtype=wp.vec3d, device=device))
+        for name in ("rest", "spread", "radius", "way"):
+            setattr(self.motion, name, wp.zeros(self.count, dtype=wp.float64, device=device))
+        self.motion.changed = wp.zeros(self.count, dtype=wp.int32, device=device)
+
+    def split_motions(self, *args: object) -> None:
+        wp.launch(split_motions, self.count, [*self.rows, *args, self.motion], device=self.device)
+
+    def bound(self, x: wp.array) -> None:
+        wp.launch(boxes_of_points, self.count, [self.wanted, *self.rows, x, self.boxes], device=self.device)
+
+
+class _SetPairs:
+    """Pairs of patches or of groups: the slack of each, what the last move takes of it, and the hot ones.
+
+    Slack is by how much the primitives of two sets that are not listed are at least further apart than the
+    range. Hot are those that may use it up.
     """
 
-    def __init__(self, is_edge_edge: bool, capacity: int, device: str) -> None:
-        self.is_edge_edge = is_edge_edge
-        self.device = device
-        self.count = wp.zeros(1, dtype=wp.int32, device=device)
-        self.length = 0
-        self.reserve(capacity)
-
-    def reserve(self, capacity: int) -> None:
-        self.pairs = wp.zeros(capacity, dtype=wp.vec4i, device=self.device)
-        self._kept = wp.zeros(capacity, dtype=wp.vec4i, device=self.device)
-        self.distance = wp.zeros(capacity, dtype=wp.float64, device=self.device)
-        self.trial = wp.zeros(capacity, dtype=wp.float64, device=self.device)
-
-    def drop_hot(self, hot: wp.array) -> None:
-        """Leave out the pairs with a hot vertex."""
-        self.count.zero_()
-        if self.length:
-            args = [self.pairs, self.distance, hot, self.count, self._kept, self.trial]
-            wp.launch(keep_cold_pairs, self.length, args, device=self.device)
-            self.pairs, self._kept = self._kept, self.pairs
-            self.accept_trial()
-
-    def accept_trial(self) -> None:
-        """The trial position is where things are now."""
-        self.distance, self.trial = self.trial, self.distance
-
-
-class _Elements:
-    """Vertices, edges or faces of one side with their bounding volume hierarchy."""
-
-    def __init__(self, indices: NDArray[np.int32], device: str) -> None:
-        self.device = device
-        self.count = len(indices)
-        self.indices = wp.array(indices, dtype=wp.int32, device=device, ndim=2)
-        self.low = wp.zeros(self.count, dtype=wp.vec3, device=device)
-        self.high = wp.zeros(self.count, dtype=wp.vec3, device=device)
-        self.bvh: wp.Bvh | None = None
-
-    def update(self, ways: Ways, rebuild: bool) -> None:
-        if self.count == 0:
-            return
-        args = [self.indices, ways.low, ways.high, self.low, self.high]
-        wp.launch(element_bounds, self.count, args, device=self.device)
-        if self.bvh is None or rebuild:
-            self.bvh = wp.Bvh(self.low, self.high)
-        else:
-            self.bvh.refit()
+    def __init__(self, capacity: int, device: str) -> None:
+        self.slack = wp.full(capacity, -1.0, dtype=wp.float64, device=device)
+        self.cost = wp.zeros(capacity, dtype=wp.float64, device=device)
+        self.most = wp.zeros(capacity, dtype=wp.float64, device=device)
+        self.hot = wp.zeros(capacity, dtype=wp.int32, device=device)
+        self.hot_pairs = wp.zeros(capacity, dtype=wp.int32, device=device)
+        self.num_hot = wp.zeros(1, dtype=wp.int32, device=device)
 
 
 class PairSearch:
     """Vertex-face and edge-edge pairs within `range_` of each other, with at least one side on the cloth.
 
-    Joint vertex array: V cloth vertices, then N of the collider. A search looks `margin` further than it
-    must, so that its lists hold until two vertices have moved by that much between them. A vertex that has
-    moved by half of it is hot: its primitives are looked for anew, the rest of the lists stays.
+    Joint vertex array: V cloth vertices, then N of the collider, at `points` (V + N, 3) when patches are cut.
+    Of every two patches, and of every two groups of patches near each other, it is known how far apart their
+    unlisted primitives are at least; the motion of one relative to the other takes from that. Where it does
+    not suffice, primitives are looked for again, `margin` further than they must.
     """
 
     def __init__(
         self,
         cloth: ClothModel,
         collider_faces: NDArray[np.int32],
-        num_collider: int,
+        points: NDArray[np.float64],
         range_: float,
         margin: float,
         device: str,
     ) -> None:
         self.device = device
-        self.radius = range_ + margin
-        self.budget = 0.5 * margin
-        self.num_cloth = cloth.num_vertices
-        n = self.num_cloth + num_collider
-        everyone = np.arange(n, dtype=np.int32)[:, None]
-        edges = igl.edges(collider_faces.astype(np.int64)) if len(collider_faces) else np.zeros((0, 2))
-        self.cloth_faces = _Elements(cloth.faces, device)
-        self.cloth_edges = _Elements(cloth.edges, device)
-        self.cloth_vertices = _Elements(everyone[: self.num_cloth], device)
-        self.body_faces = _Elements((collider_faces + self.num_cloth).astype(np.int32), device)
-        self.body_edges = _Elements((edges + self.num_cloth).astype(np.int32), device)
-        self.body_vertices = _Elements(
-            everyone[self.num_cloth :] if len(collider_faces) else everyone[:0], device
-        )
-        self._cloth = [self.cloth_faces, self.cloth_edges, self.cloth_vertices]
-        self._collider = [self.body_faces, self.body_edges, self.body_vertices]
-        self._boxes_left_behind = False
-        ways = Ways()
-        ways.low = wp.zeros(n, dtype=wp.vec3d, device=device)
-        ways.high = wp.zeros(n, dtype=wp.vec3d, device=device)
-        ways.way = wp.zeros(n, dtype=wp.float64, device=device)
-        ways.hot = wp.zeros(n, dtype=wp.int32, device=device)
-        self.ways = ways
-        self.travelled = wp.zeros(n, dtype=wp.float64, device=device)
-        self.still = wp.zeros(n, dtype=wp.vec3d, device=device)
-        self._count = wp.zeros(2, dtype=wp.int32, device=device)
-        self._whole = wp.array((everyone[:, 0] < self.num_cloth).astype(np.int32), device=device)
-        self.lists = [
-            PairList(False, 8 * self.num_cloth, device),
-            PairList(True, 16 * self.num_cloth, device),
-        ]
-        self.searches = 0
+        self.range = range_
+        self.margin = margin
+        cut = cut_into_patches(points, cloth, collider_faces)
+        self._patches = _Sets(cut.touched_by_patch, device)
+        self._groups = _Sets(cut.touched_by_group, device)
+        self._group_offsets = _integers(cut.groups, device)
+        self._primitives = _primitives(cut, device)
+        self._edge_boxes = _boxes(len(cut.edges.rows), device)
+        self._face_boxes = _boxes(len(cut.faces.rows), device)
+        self._patch_pairs = _SetPairs(cut.num_cloth * cut.count, device)
+        self._opened = wp.zeros(cut.num_cloth * cut.count, dtype=wp.int32, device=device)
+        self._num_group_pairs = wp.zeros(1, dtype=wp.int32, device=device)
+        self._reserve_groups(40 * self._groups.count)
+        self._spent = False
+        self._whole = wp.full(len(points), 1.0, dtype=wp.float64, device=device)
+        self.still = wp.zeros(len(points), dtype=wp.vec3d, device=device)
+        n = cloth.num_vertices
+        self.lists = [PairList(False, 16 * n, device), PairList(True, 48 * n, device)]
 
-    def cover(
-        self,
-        x: wp.array,
-        p: wp.array,
-        shared: NDArray[np.float64] | None = None,
-        base: wp.array | None = None,
-    ) -> None:
+    def renew(self, x: wp.array) -> None:
+        """Forget where things were, and list the pairs at x."""
+        self._forget()
+        self.cover(x, self.still)
+
+    def spend(self) -> None:
+        """The move that was covered last, or a part of it, has been made."""
+        self._spent = True
+
+    @property
+    def most(self) -> wp.array:
+        """What the two sides of a pair, by its owner, can at most come together by on the covered way, m."""
+        return self._group_pairs.most
+
+    def cover(self, x: wp.array, p: wp.array, fraction: wp.array | None = None) -> int:
         """Make sure that every pair that may come within range on the way from x to x + p is listed.
 
-        `shared` (3,) is a motion that all vertices have in common. With `base`, vertices may stop anywhere
-        between base_i and p_i.
+        With `fraction`, p is what was covered last but for the vertices that go only a fraction of their way.
+        Returns how many pairs of groups were looked at anew.
         """
-        base = self.still if base is None else base
-        n = len(x)
-        self._count.zero_()
-        shift = wp.vec3d() if shared is None else wp.vec3d(*shared)
-        args = [base, p, shift, self.num_cloth, self.budget, self.ways.way, self.travelled]
-        wp.launch(spend, n, [*args, self.ways.hot, self._count], device=self.device)
-        hot, hot_collider = self._count.numpy()
-        if hot_collider or hot > MOST_HOT * self.num_cloth:
-            self.search(x, p, shared, base)
-        elif hot:
-            for pairs in self.lists:
-                pairs.drop_hot(self.ways.hot)
-            elsewhere = self._boxes_left_behind or shared is not None
-            if self._look(x, p, base, shift, self._cloth + (self._collider if elsewhere else [])):
-                self._boxes_left_behind = shared is not None
-            else:
-                self.search(x, p, shared, base)
+        again = fraction is not None
+        for sets in (self._patches, self._groups):
+            sets.split_motions(x, p, again, fraction if again else self._whole)
+            sets.wanted.zero_()
+        found = self._look(x, p) if self._open_patches(x) else None
+        self._spent = False
+        if found is None:
+            self._forget()
+            return self.cover(x, p)
+        return found
 
-    def search(
-        self,
-        x: wp.array,
-        p: wp.array,
-        shared: NDArray[np.float64] | None = None,
-        base: wp.array | None = None,
-    ) -> None:
-        """List every pair that may come within range and `margin` on the way from x to x + p."""
-        base = self.still if base is None else base
-        shift = wp.vec3d() if shared is None else wp.vec3d(*shared)
-        self.searches += 1
-        args = [base, p, shift, self.num_cloth, self.budget, self.ways.way, self.travelled]
-        wp.launch(spend, len(x), [*args, self.ways.hot, self._count], device=self.device)
-        self.travelled.zero_()
-        while True:
-            wp.copy(self.ways.hot, self._whole)
-            for pairs in self.lists:
-                pairs.count.zero_()
-            if self._look(x, p, base, shift, self._cloth[:2] + self._collider):
-                # Boxes that leave out a motion all have in common are not where the collider is afterwards.
-                self._boxes_left_behind = shared is not None
-                return
-
-    def _look(
-        self, x: wp.array, p: wp.array, base: wp.array, shift: wp.vec3d, moved: list[_Elements]
-    ) -> bool:
-        """Append the pairs of hot vertices; False where a list was too short: it has grown.
-
-        Boxes of primitives that have not `moved` are where they were.
-        """
-        ways = self.ways
-        ways.x, ways.b, ways.p = x, base, p
-        wp.launch(sweep_vertices, len(x), [x, base, p, shift, ways.low, ways.high], device=self.device)
-        for elements in moved:
-            elements.update(ways, self.searches % REBUILD_EVERY == 1)
-        near, crossing = self.lists
-        for vertices, first in ((self.cloth_vertices, 0), (self.body_vertices, self.num_cloth)):
-            # Cold vertices of the cloth there are only where some primitives are looked for, not all.
-            if vertices.bvh is not None and (first > 0 or vertices in moved):
-                args = [vertices.bvh.id, first, self.cloth_faces.indices]
-                self._launch(vertices_near_hot_faces, self.cloth_faces.count, args, near)
-        for faces in (self.cloth_faces, self.body_faces):
-            if faces.bvh is not None:
-                args = [faces.bvh.id, faces.indices]
-                self._launch(faces_near_hot_vertices, self.num_cloth, args, near)
-        for edges in (self.cloth_edges, self.body_edges):
-            if edges.bvh is not None:
-                same = int(edges is self.cloth_edges)
-                args = [edges.bvh.id, self.cloth_edges.indices, edges.indices, same]
-                self._launch(edges_near_hot_edges, self.cloth_edges.count, args, crossing)
-        wp.launch(rest, len(x), [ways.hot, self.travelled], device=self.device)
-        enough = True
+    def _forget(self) -> None:
+        """Leave nothing listed, and nothing known of how far apart things are."""
+        self._spent = False
+        self._opened.zero_()
+        self._patch_pairs.slack.fill_(-1.0)
+        self._num_group_pairs.zero_()
+        self.num_group_pairs = self._fewest = 0
         for pairs in self.lists:
-            pairs.length = int(pairs.count.numpy()[0])
-            if pairs.length > len(pairs.pairs):
-                pairs.reserve(pairs.length + pairs.length // 2)
-                enough = False
-        return enough
+            pairs.length = 0
 
-    def _launch(self, kernel: wp.Kernel, count: int, args: list, pairs: PairList) -> None:
-        args = [*args, self.ways, self.radius, pairs.count, pairs.pairs, pairs.distance]
-        wp.launch(kernel, count, args, device=self.device)
+    def _reserve_groups(self, capacity: int) -> None:
+        self._group_pairs = _SetPairs(capacity, self.device)
+        self._pairs_of_groups = wp.zeros(capacity, dtype=wp.vec2i, device=self.device)
+        self.num_group_pairs = self._fewest = 0
+
+    def _open_patches(self, x: wp.array) -> bool:
+        """Pairs of groups for patches that come near each other; False if these have become too many."""
+        patches, pairs, groups = self._patches, self._patch_pairs, self._group_pairs
+        pairs.num_hot.zero_()
+        args = [patches.motion, patches.count, self._spent, self._opened, pairs.slack, pairs.cost]
+        args += [patches.wanted, pairs.num_hot, pairs.hot_pairs]
+        wp.launch(find_hot_patches, len(pairs.slack), args, device=self.device)
+        num_hot = int(pairs.num_hot.numpy()[0])
+        if num_hot == 0:
+            return True
+        patches.bound(x)
+        args = [pairs.hot_pairs, patches.count, patches.boxes, self._group_offsets, self.range, AHEAD]
+        args += [pairs.slack, pairs.cost, self._opened]
+        args += [self._num_group_pairs, self._pairs_of_groups, groups.slack]
+        wp.launch(open_patches, num_hot, args, device=self.device)
+        count = int(self._num_group_pairs.numpy()[0])
+        if count > len(groups.slack):
+            self._reserve_groups(count + count // 2)
+            return False
+        if self._fewest == 0:
+            self._fewest = count
+        self.num_group_pairs = count
+        return count <= MORE * self._fewest
+
+    def _look(self, x: wp.array, p: wp.array) -> int | None:
+        """List the primitives of hot groups anew; None if there were too many of them."""
+        groups, pairs = self._groups, self._group_pairs
+        pairs.num_hot.zero_()
+        args = [self._pairs_of_groups, groups.motion, self._spent, pairs.slack, pairs.cost]
+        args += [pairs.most, pairs.hot, groups.wanted, pairs.num_hot, pairs.hot_pairs]
+        wp.launch(find_hot_groups, self.num_group_pairs, args, device=self.device)
+        num_hot = int(pairs.num_hot.numpy()[0])
+        if num_hot == 0:
+            return 0
+        groups.bound(x)
+        made = self._primitives
+        for offsets, rows, boxes in (
+            (made.edge_offsets, made.edges, self._edge_boxes),
+            (made.face_offsets, made.faces, self._face_boxes),
+        ):
+            args = [groups.wanted, offsets, rows, x, boxes]
+            wp.launch(boxes_of_primitives, groups.count, args, device=self.device)
+        for listed in self.lists:
+            listed.drop_hot(pairs.hot)
+        near, crossing = self.lists
+        for kernel, count, boxes, listed in (
+            (find_near_faces, 2 * num_hot, self._face_boxes, near),
+            (find_near_edges, num_hot, self._edge_boxes, crossing),
+        ):
+            args = [pairs.hot_pairs, self._pairs_of_groups, made, groups.boxes, boxes, x, p]
+            args += [self.range + self.margin, pairs.cost, listed.found]
+            wp.launch(kernel, count, args, device=self.device)
+        args = [pairs.hot_pairs, self._pairs_of_groups, groups.boxes, self.range, self.margin]
+        wp.launch(renew_slack, num_hot, [*args, pairs.slack, pairs.cost], device=self.device)
+        enough = True
+        for listed in self.lists:
+            listed.length = int(listed.count.numpy()[0])
+            if listed.length > len(listed.pairs):
+                listed.reserve(listed.length + listed.length // 2)
+                enough = False
+        return num_hot if enough else None
+
+
+def _integers(values: NDArray[np.int32], device: str) -> wp.array:
+    return wp.array(values, dtype=wp.int32, ndim=values.ndim, device=device)
+
+
+def _boxes(count: int, device: str) -> Boxes:
+    boxes = Boxes()
+    boxes.low = wp.zeros(count, dtype=wp.vec3d, device=device)
+    boxes.high = wp.zeros(count, dtype=wp.vec3d, device=device)
+    return boxes
+
+
+def _primitives(cut: Patches, device: str) -> GroupPrimitives:
+    made = GroupPrimitives()
+    made.vertex_offsets = _integers(cut.vertices.offsets, device)
+    made.vertices = _integers(cut.vertices.rows, device)
+    made.edge_offsets = _integers(cut.edges.offsets, device)
+    made.edges = _integers(cut.edges.rows, device)
+    made.face_offsets = _integers(cut.faces.offsets, device)
+    made.faces = _integers(cut.faces.rows, device)
+    return made

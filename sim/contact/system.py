@@ -15,6 +15,7 @@ from muslin.sim.contact.barrier import (
     barrier_derivatives,
     barrier_value,
     guard_pairs,
+    lower_distances,
 )
 from muslin.sim.contact.ccd import cut_fractions, go_part_of_way, largest_safe_step
 from muslin.sim.contact.friction import (
@@ -24,7 +25,8 @@ from muslin.sim.contact.friction import (
     set_bristles,
     share_bristles,
 )
-from muslin.sim.contact.search import PairList, PairSearch
+from muslin.sim.contact.pair_list import PairList
+from muslin.sim.contact.search import PairSearch
 from muslin.sim.solve.block_matrix import BlockMatrix
 
 
@@ -44,9 +46,12 @@ class ContactSettings:
 MAX_CUTS = 16
 """Passes over the pairs in which moves are shortened vertex by vertex."""
 
+MAX_ROUNDS = 4
+"""How often moves are shortened until the pairs on the way that is left are all known."""
+
 
 class ContactSystem:
-    """Joint vertex array: V cloth vertices, then N collider vertices.
+    """Joint vertex array: V cloth vertices, then N collider vertices, at `points` (V + N, 3) to begin with.
 
     `collider_faces` (M, 3) index the collider's own vertices.
     """
@@ -55,17 +60,16 @@ class ContactSystem:
         self,
         cloth: ClothModel,
         collider_faces: NDArray[np.int32],
-        num_collider: int,
+        points: NDArray[np.float64],
         settings: ContactSettings,
         device: str,
     ) -> None:
         self.settings = settings
         self.device = device
         self.num_cloth = cloth.num_vertices
-        self.num_collider = num_collider
-        n = self.num_cloth + self.num_collider
+        n = len(points)
         self.collider_faces = collider_faces
-        self.search = PairSearch(cloth, collider_faces, num_collider, settings.range, settings.margin, device)
+        self.search = PairSearch(cloth, collider_faces, points, settings.range, settings.margin, device)
         self.measure = PairMeasure()
         self.measure.vertex_area = wp.array(cloth.vertex_area, dtype=wp.float64, device=device)
         self.measure.num_cloth = self.num_cloth
@@ -79,7 +83,9 @@ class ContactSystem:
         self.friction.cloth_cloth = settings.friction_cloth
         self.friction.slip = settings.slip
         self.num_friction = 0
-        self._fractions = [wp.zeros(n, dtype=wp.float64, device=device) for _ in range(3)]
+        self._before, self._fraction, self._after = (
+            wp.zeros(n, dtype=wp.float64, device=device) for _ in range(3)
+        )
         self._cut = wp.zeros(1, dtype=wp.int32, device=device)
         self.friction.bristle = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
         self._bristle_total = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
@@ -101,34 +107,58 @@ class ContactSystem:
                 wp.launch(largest_safe_step, pairs.length, args, device=self.device)
         return float(step.numpy()[0])
 
-    def cut_to_safety(self, x: wp.array, p: wp.array, step: wp.array, base: wp.array | None = None) -> float:
-        """Shorten p, vertex by vertex, towards `base` (or rest) until no listed pair touches on x + p.
+    def cut_to_safety(
+        self,
+        x: wp.array,
+        p: wp.array,
+        step: wp.array,
+        base: wp.array | None = None,
+    ) -> float:
+        """Shorten p, vertex by vertex, towards `base` (or rest) until no pair touches on x + p.
 
-        What `MAX_CUTS` passes leave undone is up to the returned t in (0, 1]: x + t p is safe. `step` is
-        scratch (1,).
+        What that leaves undone is up to the returned t in (0, 1]: x + t p is safe. p must be covered, and is
+        again when it has been shortened. `step` is scratch (1,).
         """
-        base = self.search.still if base is None else base
-        before, fraction, after = self._fractions
+        for _ in range(MAX_ROUNDS):
+            passes = self._shorten(x, p, self.search.still if base is None else base)
+            if passes == 0:
+                return 1.0
+            # Some are slower now than those around them: pairs may meet that would have moved as one.
+            looked = self.search.cover(x, p, self._fraction)
+            if passes == MAX_CUTS:
+                break
+            if looked == 0:
+                return 1.0
+        return self.largest_step(x, p, step)
+
+    def _shorten(self, x: wp.array, p: wp.array, base: wp.array) -> int:
+        """Passes over the listed pairs that shortened p; after `MAX_CUTS` of them some may still touch."""
+        before, fraction, after = self._before, self._fraction, self._after
         before.zero_()
         fraction.fill_(1.0)
-        for _ in range(MAX_CUTS):
+        for passes in range(MAX_CUTS + 1):
+            if passes == MAX_CUTS:
+                break
             self._cut.zero_()
             wp.copy(after, fraction)
             for pairs in self.lists:
                 if pairs.length:
-                    args = [x, base, p, self.search.ways.way, pairs.pairs, pairs.distance, pairs.is_edge_edge]
-                    args += [before, fraction, after, self._cut]
+                    args = [x, base, p, pairs.pairs, pairs.owner, self.search.most, pairs.distance]
+                    args += [pairs.is_edge_edge, passes == 0, before, fraction, after, self._cut]
                     wp.launch(cut_fractions, pairs.length, args, device=self.device)
             if int(self._cut.numpy()[0]) == 0:
                 break
             before, fraction, after = fraction, after, before
+        self._before, self._fraction, self._after = before, fraction, after
         wp.launch(go_part_of_way, len(x), [base, p, fraction], device=self.device)
-        return 1.0 if int(self._cut.numpy()[0]) == 0 else self.largest_step(x, p, step)
+        return passes
 
-    def forget_distances(self) -> None:
-        """Vertices have moved: nothing is known of how far apart the pairs are."""
+    def lower_distances(self, step: float) -> None:
+        """So much of the covered move has been made."""
         for pairs in self.lists:
-            pairs.distance.zero_()
+            if pairs.length:
+                args = [step, pairs.owner, self.search.most, pairs.distance]
+                wp.launch(lower_distances, pairs.length, args, device=self.device)
 
     def accept_trial(self) -> None:
         """The positions of the last `add_value` are where things are now."""
@@ -139,17 +169,8 @@ class ContactSystem:
         """Energy at x, by no more than `step` of the last covered move away from where things are."""
         for pairs in self.lists:
             if pairs.length:
-                args = [
-                    x,
-                    self.search.ways.way,
-                    step,
-                    start,
-                    pairs.pairs,
-                    pairs.distance,
-                    pairs.is_edge_edge,
-                    self.measure,
-                ]
-                args += [pairs.trial, energy]
+                args = [x, step, start, pairs.pairs, pairs.owner, self.search.most, pairs.distance]
+                args += [pairs.is_edge_edge, self.measure, pairs.trial, energy]
                 wp.launch(barrier_value, pairs.length, args, device=self.device)
         if self.num_friction:
             args = [x, start, self.friction, energy]
@@ -192,8 +213,12 @@ class ContactSystem:
         wp.launch(set_bristles, self.num_cloth, [*totals, self.friction.bristle], device=self.device)
 
     def turn_friction(self, turn: NDArray[np.float64]) -> None:
-        """What friction holds turns with the world, by a rotation (3, 3); zeros let go of it."""
+        """What friction holds turns with the world, by a rotation (3, 3)."""
         self.friction.bristle.assign(self.friction.bristle.numpy() @ turn.T)
+
+    def forget_friction(self) -> None:
+        """Friction lets go of what it holds."""
+        self.friction.bristle.zero_()
 
     def smallest_distance(self, x: wp.array) -> float:
         """Smallest distance among the listed pairs, m; infinity where none is listed.

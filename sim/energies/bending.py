@@ -148,8 +148,12 @@ def rigidity_at(
 def face_curvature(f: int, model: BendModel, angle: wp.array(dtype=wp.float64)) -> curvaturev:
     """K of a face, 1/m."""
     k = curvaturev()
-    for a in range(model.offsets[f], model.offsets[f + 1]):
+    # Not range(), here and below: Warp's is dearer than the products.
+    a = int(model.offsets[f])
+    end = model.offsets[f + 1]
+    while a < end:
         k += model.weight[a] * angle[model.member[a]]
+        a += 1
     return k
 
 
@@ -215,11 +219,14 @@ def bend_torque(
     if damping > wp.float64(0.0):
         m += apply_form(model.rigidity[fabric, 0], k - previous[f]) * damping
         tangent += model.rigidity[fabric, 0] * damping
-    for a in range(model.offsets[f], model.offsets[f + 1]):
+    a = int(model.offsets[f])
+    end = model.offsets[f + 1]
+    while a < end:
         w = model.weight[a]
         wp.atomic_add(state.torque, model.member[a], area * wp.dot(w, m))
         stiffness = COUPLING * area * wp.dot(w, apply_form(tangent, w))
         wp.atomic_add(state.stiffness, model.member[a], stiffness)
+        a += 1
 
 
 @wp.kernel
@@ -238,14 +245,18 @@ def bend_derivatives(
     stiffness = state.stiffness[h]
     order = model.order[h]
     slot = int(0)
-    for a in range(int(0), int(4)):
+    a = int(0)
+    while a < 4:
         i = order[a]
         gi = wp.vec3d(grad[i, 0], grad[i, 1], grad[i, 2])
         wp.atomic_add(gradient, v[i], gi * torque)
         row = gi * stiffness
-        for b in range(int(0), a):
+        b = int(0)
+        while b < a:
             j = order[b]
             gj = wp.vec3d(grad[j, 0], grad[j, 1], grad[j, 2])
             wp.atomic_add(matrix.values, model.slots[h, slot], wp.outer(row, gj))
             slot += 1
+            b += 1
         wp.atomic_add(matrix.diagonal, v[i], wp.outer(row, gi))
+        a += 1

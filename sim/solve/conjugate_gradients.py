@@ -33,11 +33,15 @@ def multiply(matrix: BlockMatrix, extras: int, x: wp.array(dtype=wp.vec3d), out:
     for i in range(matrix.diagonal.shape[0]):
         xi = x[i]
         total = matrix.diagonal[i] * xi
-        for a in range(matrix.offsets[i], matrix.offsets[i + 1]):
+        # Not range(): Warp's costs as much as two of the products.
+        a = int(matrix.offsets[i])
+        end = matrix.offsets[i + 1]
+        while a < end:
             j = matrix.columns[a]
             block = matrix.values[a]
             total += block * x[j]
             out[j] = out[j] + xi * block
+            a += 1
         out[i] = total
     for e in range(extras):
         ij = matrix.extra_index[e]

@@ -99,9 +99,13 @@ def try_factorise(matrix: BlockMatrix, factor: LowerFactor, shift: wp.float64) -
         for a in range(factor.offsets[i], factor.offsets[i + 1]):
             k = factor.columns[a]
             block = matrix.values[a]
-            for b in range(factor.product_offsets[a], factor.product_offsets[a + 1]):
+            # Not range(): Warp's costs as much as two of the products.
+            b = int(factor.product_offsets[a])
+            end = factor.product_offsets[a + 1]
+            while b < end:
                 uv = factor.products[b]
                 block -= factor.values[uv[0]] * wp.transpose(factor.values[uv[1]])
+                b += 1
             l = block * wp.transpose(factor.inverse[k])
             factor.values[a] = l
             s -= l * wp.transpose(l)
@@ -133,12 +137,18 @@ def apply_inverse(factor: LowerFactor, r: wp.array(dtype=wp.vec3d), z: wp.array(
     n = factor.offsets.shape[0] - 1
     for i in range(n):
         s = r[i]
-        for a in range(factor.offsets[i], factor.offsets[i + 1]):
+        a = int(factor.offsets[i])
+        end = factor.offsets[i + 1]
+        while a < end:
             s -= factor.values[a] * z[factor.columns[a]]
+            a += 1
         z[i] = factor.inverse[i] * s
     for j in range(n):
         i = n - 1 - j
         s = z[i] * factor.inverse[i]
         z[i] = s
-        for a in range(factor.offsets[i], factor.offsets[i + 1]):
+        a = int(factor.offsets[i])
+        end = factor.offsets[i + 1]
+        while a < end:
             z[factor.columns[a]] = z[factor.columns[a]] - s * factor.values[a]
+            a += 1

@@ -20,13 +20,13 @@ class SolverSettings:
     drag: float = 0.5
     tolerance: float = 5.0e-4
     min_iterations: int = 2
-    max_iterations: int = 4
+    max_iterations: int = 3
     max_advances: int = 30
     relaxations: int = 2
     guards: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
-    linear_tolerance: float = 0.1
+    linear_tolerance: float = 1.0e-3
     max_linear_iterations: int = 400
     max_splits: int = 4
     air: AirSettings | None = None

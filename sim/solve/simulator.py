@@ -53,13 +53,12 @@ class ClothSimulator:
         n = cloth.num_vertices
         self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
         self.air = None if self.settings.air is None else AirDrag(cloth, self.settings.air, device)
-        self.contact = ContactSystem(
-            cloth, collider_faces, len(collider_vertices), contact or ContactSettings(), device
-        )
+        points = np.concatenate([positions, collider_vertices])
+        self.contact = ContactSystem(cloth, collider_faces, points, contact or ContactSettings(), device)
         self.linear = LinearSystem(cloth, device)
-        total = n + len(collider_vertices)
+        total = len(points)
         vec = {"dtype": wp.vec3d, "device": device}
-        self.x = wp.array(np.concatenate([positions, collider_vertices]), **vec)
+        self.x = wp.array(points, **vec)
         self.start = wp.zeros(total, **vec)
         self.trial = wp.zeros(total, **vec)
         self.p = wp.zeros(total, **vec)
@@ -77,7 +76,7 @@ class ClothSimulator:
         self.pins = np.zeros(n, bool)
         self.work_left = np.inf
         self._gravity = wp.vec3d(*self.settings.gravity)
-        self.contact.search.search(self.x, self.p)
+        self.contact.search.renew(self.x)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -140,7 +139,7 @@ class ClothSimulator:
     def place(self, positions: NDArray[np.float64], collider_vertices: NDArray[np.float64]) -> None:
         """Put cloth and collider somewhere else, at rest; they must not intersect there."""
         self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
-        self.contact.turn_friction(np.zeros((3, 3)))
+        self.contact.forget_friction()
 
     def turn_world(self, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
         """Move everything as one rigid piece, what friction holds too: x -> turn x + shift, to rest."""
@@ -151,8 +150,7 @@ class ClothSimulator:
         """Put the joint vertex array (V + N, 3) and the velocities back to a saved, free state."""
         self.x.assign(x)
         self.velocity = velocity.copy()
-        self.p.zero_()
-        self.contact.search.search(self.x, self.p)
+        self.contact.search.renew(self.x)
 
     def _advance(
         self,
@@ -217,7 +215,7 @@ class ClothSimulator:
                 # A short way means that something is squeezed: let it give way before the collider goes on.
                 relaxing = s.relaxations if safe < 0.5 and not arrived else 0
                 continue
-            size, step = self._relax(remaining[led] * 0.0, led, dt, report)
+            size, step = self._relax(led, dt, report)
             relaxing = max(relaxing - 1, 0)
             if not arrived:
                 continue
@@ -242,8 +240,7 @@ class ClothSimulator:
             return False
         self.remaining.assign(remaining)
         self.carry.moves(self.x, self.remaining, self.target, self.base, self.p)
-        shared = self.p.numpy()[:n].mean(axis=0)
-        self.contact.search.cover(self.x, self.p, shared, self.base)
+        self.contact.search.cover(self.x, self.p)
         if self.contact.cut_to_safety(self.x, self.p, self._scalar, self.base) < 1.0:
             return False
         self._move(1.0)
@@ -258,7 +255,7 @@ class ClothSimulator:
         self.remaining.assign(way)
         self._assemble(1.0 / dt)
         for guard in range(s.guards + 1):
-            self._direction(way[led], led, True, report)
+            self._direction(way[led], led, report)
             safe = self.contact.largest_step(self.x, self.p, self._scalar)
             if safe >= 0.5 or guard == s.guards:
                 break
@@ -268,32 +265,27 @@ class ClothSimulator:
         self._move(safe)
         return safe
 
-    def _relax(
-        self, still: NDArray[np.float64], led: NDArray[np.bool_], dt: float, report: StepReport
-    ) -> tuple[float, float]:
+    def _relax(self, led: NDArray[np.bool_], dt: float, report: StepReport) -> tuple[float, float]:
         """One Newton iteration with collider and pins where they are.
 
         Returns the largest move that it asks for and the share of it that was made.
         """
         self.remaining.zero_()
         self._assemble(1.0 / dt)
-        size, limit = self._direction(still, led, False, report)
+        size, limit = self._direction(None, led, report)
         wp.copy(self.uncut, self.p)
         step = self._line_search(self.contact.cut_to_safety(self.x, self.p, self._scalar), 1.0 / dt)
         if step == 0.0:
             # Shortened here and there, the direction may not go downhill; as a whole it does.
             wp.copy(self.p, self.uncut)
+            self.contact.search.cover(self.x, self.p)
             step = self._line_search(self.contact.largest_step(self.x, self.p, self._scalar), 1.0 / dt)
         return size, step * limit
 
     def _direction(
-        self,
-        told: NDArray[np.float64],
-        led: NDArray[np.bool_],
-        moving: bool,
-        report: StepReport,
+        self, told: NDArray[np.float64] | None, led: NDArray[np.bool_], report: StepReport
     ) -> tuple[float, float]:
-        """Solve for the next move p, `told` where `led`, and list the contacts on its way.
+        """Solve for the next move p, `told` or nothing where `led`, and list the contacts on its way.
 
         Returns the largest move of a cloth vertex before p was scaled, and the scale.
         """
@@ -312,18 +304,18 @@ class ClothSimulator:
         report.newton += 1
         # A copy: on the CPU numpy() is a view, and what follows would measure p after it was scaled.
         p = self.p.numpy().copy()
-        p[led] = told
+        p[led] = 0.0 if told is None else told
         size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
         if not np.isfinite(size):
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
-        if moving:
+        limit = min(1.0, s.max_move / max(size, 1e-30))
+        if told is not None:
+            limit = 1.0
             # Squeezed cloth may ask to go anywhere: no further than what leads it and `max_move`.
             bound = s.max_move + np.linalg.norm(told, axis=1).max(initial=0.0)
             p[:n] *= bound / np.maximum(np.linalg.norm(p[:n], axis=1, keepdims=True), bound)
-        limit = 1.0 if moving else min(1.0, s.max_move / max(size, 1e-30))
         self.p.assign(p * limit)
-        shared = limit * p[:n].mean(axis=0) if moving else None
-        self.contact.search.cover(self.x, self.p, shared)
+        self.contact.search.cover(self.x, self.p)
         return size, limit
 
     def _led(self) -> NDArray[np.bool_]:
@@ -380,7 +372,8 @@ class ClothSimulator:
         """Go `step` p, wherever the energy goes."""
         self._go(step)
         self.x, self.trial = self.trial, self.x
-        self.contact.forget_distances()
+        self.contact.lower_distances(step)
+        self.contact.search.spend()
         self._energy_here = None
 
     def _line_search(self, step: float, inverse_dt: float) -> float:
@@ -394,6 +387,7 @@ class ClothSimulator:
             if energy < self._energy_here:
                 self.x, self.trial = self.trial, self.x
                 self.contact.accept_trial()
+                self.contact.search.spend()
                 self._energy_here = energy
                 return step
             step *= 0.5

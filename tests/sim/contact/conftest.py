@@ -55,8 +55,16 @@ class Soup:
         return wp.array(np.asarray(points, dtype=np.float64).reshape(-1, 3), dtype=wp.vec3d, device="cpu")
 
     def search(self, points, move=None) -> None:
-        move = np.zeros_like(points) if move is None else move
-        self.contact.search.search(self.array(points), self.array(move))
+        """List the pairs on the way by `move`, as if nothing had been known before."""
+        self.contact.search.renew(self.array(points))
+        if move is not None:
+            self.cover(points, move)
+
+    def cover(self, points, move, fraction=None) -> int:
+        """List the pairs on the way by `move`; the number of pairs of groups that were looked at for it."""
+        if fraction is not None:
+            fraction = wp.array(fraction, dtype=wp.float64, device="cpu")
+        return self.contact.search.cover(self.array(points), self.array(move), fraction)
 
     def pairs(self, is_edge_edge: bool) -> np.ndarray:
         """(K, 4) vertices of the listed pairs."""
@@ -66,7 +74,8 @@ class Soup:
     def energy(self, points, start) -> float:
         """Of barrier and friction, joules."""
         total = wp.zeros(1, dtype=wp.float64, device="cpu")
-        self.contact.forget_distances()
+        for pairs in self.contact.lists:
+            pairs.distance.zero_()
         self.contact.add_value(self.array(points), 0.0, self.array(start), total)
         return float(total.numpy()[0])
 
@@ -99,7 +108,9 @@ def make_soup(flat_mesh) -> Callable[..., Soup]:
         mesh = flat_mesh(panel, np.arange(3 * cloth).reshape(-1, 3))
         model = build_cloth(mesh, load_fabric("gray-interlock"))
         faces = np.arange(3 * collider, dtype=np.int32).reshape(-1, 3)
-        contact = ContactSystem(model, faces, 3 * collider, ContactSettings(**settings), "cpu")
+        # All in one place: patches of the sheets that the tests lay elsewhere.
+        points = np.zeros((3 * (cloth + collider), 3))
+        contact = ContactSystem(model, faces, points, ContactSettings(**settings), "cpu")
         return Soup(model, contact, LinearSystem(model, "cpu"), cloth + collider)
 
     return make

@@ -86,45 +86,75 @@ def test_a_list_longer_than_its_room_grows(make_soup):
 
 
 @pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
-def test_a_covered_move_needs_no_search_and_misses_nothing(make_soup, closest, is_edge_edge):
+def test_small_moves_need_no_search_and_miss_nothing(make_soup, closest, is_edge_edge):
     soup = make_soup(20, 20)
     points = random_soup(40, seed=2)
     soup.search(points)
-    searches = soup.contact.search.searches
     draw = np.random.default_rng(4)
     for _ in range(4):
         move = draw.normal(size=points.shape)
         move *= 0.12 * MARGIN / np.linalg.norm(move, axis=1, keepdims=True)
-        soup.contact.search.cover(soup.array(points), soup.array(move))
+        assert soup.cover(points, move) == 0
+        soup.contact.search.spend()
         points = points + move
         wanted = near(closest, soup, [points], is_edge_edge, RANGE)
         assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
-    assert soup.contact.search.searches == searches
-    soup.contact.search.cover(soup.array(points), soup.array(np.full_like(points, 0.02 * MARGIN)))
-    assert soup.contact.search.searches == searches + 1
+    assert soup.cover(points, 0.12 * MARGIN * np.sign(draw.normal(size=points.shape))) > 0
+
+
+def test_a_move_that_is_covered_but_not_made_costs_nothing(make_soup):
+    soup = make_soup(20, 20)
+    points = random_soup(40, seed=2)
+    soup.search(points)
+    move = np.random.default_rng(4).normal(size=points.shape)
+    move *= 0.3 * MARGIN / np.linalg.norm(move, axis=1, keepdims=True)
+    for _ in range(5):
+        assert soup.cover(points, move) == 0
 
 
 @pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
-def test_after_looking_for_hot_vertices_alone_nothing_is_missing_or_listed_twice(
-    make_soup, closest, is_edge_edge
-):
-    """A few triangles of cloth wander far, one after the other, the others hardly."""
+@pytest.mark.parametrize("speed", [0.001, 0.01])
+def test_on_a_long_way_nothing_is_missing_or_listed_twice(make_soup, closest, is_edge_edge, speed):
+    """Everything turns and shifts as one, some triangles wander besides, and a collider flies by."""
     soup = make_soup(40, 10)
     points = random_soup(50, seed=12, box=0.02)
     soup.search(points)
-    searches = soup.contact.search.searches
     draw = np.random.default_rng(5)
-    for round_ in range(6):
-        move = 0.02 * MARGIN * draw.normal(size=points.shape)
-        move[3 * soup.num_cloth // 3 :] = 0.0
-        move[9 * round_ : 9 * round_ + 9] += 0.01 * draw.normal(size=3)
-        soup.contact.search.cover(soup.array(points), soup.array(move))
+    listings = 0
+    for round_ in range(8):
+        move = np.cross([0.1, -0.2, 0.1], points) + np.array([0.03, 0.0, -0.01])
+        move += 0.02 * MARGIN * draw.normal(size=move.shape)
+        move[9 * round_ : 9 * round_ + 9] += speed * draw.normal(size=3)
+        move[-15:] += 3.0 * speed * draw.normal(size=3)
+        listings += soup.cover(points, move)
         path = [points + t * move for t in np.linspace(0, 1, 5)]
         listed = keys(soup.pairs(is_edge_edge), is_edge_edge)
-        assert near(closest, soup, path, is_edge_edge, RANGE) <= set(listed)
+        wanted = near(closest, soup, path, is_edge_edge, RANGE)
+        assert wanted
+        assert wanted <= set(listed)
         assert len(set(listed)) == len(listed)
-        points = points + move
-    assert soup.contact.search.searches == searches
+        soup.contact.search.spend()
+        points = points + draw.choice([0.3, 1.0]) * move
+    assert listings > 0
+
+
+@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
+def test_a_shortened_move_is_covered_where_it_has_changed(make_soup, closest, is_edge_edge):
+    """Of a motion that all share, some vertices make a part only: they meet others that they never met."""
+    soup = make_soup(30, 10)
+    points = random_soup(40, seed=6, box=0.02)
+    move = np.tile([0.05, 0.0, 0.02], (len(points), 1))
+    soup.search(points, move)
+    fraction = np.ones(len(points))
+    fraction[12:30] = 0.4
+    looked = soup.cover(points, move * fraction[:, None], fraction)
+    path = [points + t * fraction[:, None] * move for t in np.linspace(0, 1, 9)]
+    wanted = near(closest, soup, path, is_edge_edge, RANGE)
+    listed = keys(soup.pairs(is_edge_edge), is_edge_edge)
+    assert looked > 0
+    assert wanted
+    assert wanted <= set(listed)
+    assert len(set(listed)) == len(listed)
 
 
 @pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
@@ -136,46 +166,13 @@ def test_at_rest_exactly_the_near_pairs_are_listed(make_soup, closest, is_edge_e
     assert set(keys(soup.pairs(is_edge_edge), is_edge_edge)) == wanted
 
 
-@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
-def test_ways_that_may_end_anywhere_between_two_moves_are_covered(make_soup, closest, is_edge_edge):
-    soup = make_soup(15, 15)
-    points = random_soup(30, seed=6, box=0.02)
-    draw = np.random.default_rng(8)
-    base, move = 0.01 * draw.normal(size=(2, *points.shape)) + np.array([0.3, 0.0, 0.1])
-    soup.contact.search.search(soup.array(points), soup.array(move), None, soup.array(base))
-    shares = [0.0, 1.0, 0.5] + [draw.uniform(size=(len(points), 1)) for _ in range(5)]
-    path = [points + t * (base + f * (move - base)) for f in shares for t in (0.5, 1.0)]
-    wanted = near(closest, soup, path, is_edge_edge, RANGE)
-    assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
-
-
-@pytest.mark.parametrize("is_edge_edge", [False, True], ids=["vertex-face", "edge-edge"])
-def test_hot_vertices_find_a_collider_that_has_moved_since_the_last_search(make_soup, closest, is_edge_edge):
-    """The search before the move left out the motion that all have in common; the collider is there now."""
-    soup = make_soup(20, 20)
-    points = random_soup(40, seed=14, box=0.02)
-    common = np.array([0.1, 0.0, 0.05])
-    moves = np.tile(common, (len(points), 1))
-    soup.contact.search.search(soup.array(points), soup.array(moves), common)
-    searches = soup.contact.search.searches
-    points = points + moves
-    move = np.zeros_like(points)
-    move[:9] = [0.0, 0.01, 0.0]
-    soup.contact.search.cover(soup.array(points), soup.array(move))
-    assert soup.contact.search.searches == searches
-    wanted = near(closest, soup, [points, points + move], is_edge_edge, RANGE)
-    assert wanted
-    assert wanted <= set(keys(soup.pairs(is_edge_edge), is_edge_edge))
-
-
 def test_neighbours_are_no_pairs(grid_mesh):
     """Primitives that share a vertex touch by construction."""
     mesh = grid_mesh(3, 3, 1e-3)
     cloth = build_cloth(mesh, load_fabric("gray-interlock"))
-    contact = ContactSystem(cloth, np.zeros((0, 3), np.int32), 0, ContactSettings(), "cpu")
     flat = np.insert(mesh.panel_vertices, 2, 0.0, axis=1)
-    x = wp.array(flat, dtype=wp.vec3d, device="cpu")
-    contact.search.search(x, wp.zeros_like(x))
+    contact = ContactSystem(cloth, np.zeros((0, 3), np.int32), flat, ContactSettings(), "cpu")
+    contact.search.renew(wp.array(flat, dtype=wp.vec3d, device="cpu"))
     for pairs in contact.lists:
         listed = pairs.pairs.numpy()[: pairs.length]
         assert len(listed) > 50

@@ -111,13 +111,14 @@ def test_whole_meshes_step_without_collision(grid_mesh, seed):
     body += 1e-4 * draw.normal(size=body.shape)
     cloth = wave + 1e-4 * draw.normal(size=flat.shape)
     faces = np.concatenate([mesh.faces, mesh.faces + len(flat)])
-    contact = ContactSystem(
-        build_cloth(mesh, load_fabric("gray-interlock")), faces, len(body), ContactSettings(), "cpu"
-    )
     points = np.concatenate([cloth, body])
+    contact = ContactSystem(
+        build_cloth(mesh, load_fabric("gray-interlock")), faces, points, ContactSettings(), "cpu"
+    )
     move = 0.01 * draw.normal(size=points.shape)
     x, p = (wp.array(values, dtype=wp.vec3d, device="cpu") for values in (points, move))
-    contact.search.search(x, p)
+    contact.search.renew(x)
+    contact.search.cover(x, p)
     step = contact.largest_step(x, p, wp.zeros(1, dtype=wp.float64, device="cpu"))
     assert 1e-3 < step < 1.0
 
@@ -165,7 +166,7 @@ def test_what_is_cut_falls_back_on_the_base(make_soup):
     moves[3:, 1] = -0.01
     soup = make_soup(2, 0)
     x, p, b = soup.array(points), soup.array(moves), soup.array(base)
-    soup.contact.search.search(x, p, None, b)
+    soup.search(points, moves)
     share = soup.contact.cut_to_safety(x, p, wp.zeros(1, dtype=wp.float64, device="cpu"), b)
     assert share == 1.0
     np.testing.assert_array_equal(p.numpy()[:, [0, 2]], base[:, [0, 2]])
