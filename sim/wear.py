@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.model import BodyModel
 from muslin.sim.cloth import ClothModel
-from muslin.sim.contact.clearance import SelfClearance
+from muslin.sim.contact.clearance import SelfClearance, differs, room_for
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.layers import dress
 from muslin.sim.solve.settings import SolverSettings
@@ -53,16 +53,24 @@ class WornGarment:
         self.beta = beta
         self.theta = REST_POSE
         self.translation = np.zeros(3)
-        self.clearance = SelfClearance(model.vertices(beta, REST_POSE), model.faces, device)
+        room = room_for(np.concatenate([cloth.rest_area for cloth in cloths]))
+        self.clearance = SelfClearance(model.vertices(beta, REST_POSE), model.faces, device, room)
         self.sim = dress(meshes, cloths, model, beta, contact, solver, device, tick)
 
     def body(self) -> NDArray[np.float64]:
         """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""
         return self.model.vertices(self.beta, self.theta, self.translation)
 
-    def _collider(self) -> NDArray[np.float64]:
-        """What the cloth must meet where the body now stands."""
-        return self.clearance.collider(self.body(), self.sim.positions, self.sim.collider_vertices)
+    def _advance(self, dt: float, inertia: bool) -> None:
+        """One time step in which the collider goes where the body now stands.
+
+        Between parts of the body that cut into each other, where the collider is not the body anyway, it may
+        go elsewhere: where it would squeeze cloth, along with the other part.
+        """
+        body = self.body()
+        target = self.clearance.collider(body, self.sim.positions, self.sim.collider_vertices)
+        self.sim.yielding = differs(body, target)
+        self.sim.advance(target, dt, inertia=inertia)
 
     def masked_faces(self) -> NDArray[np.int32]:
         """Faces on which the collider, as it stands, differs from the body."""
@@ -86,7 +94,7 @@ class WornGarment:
             share = k / steps
             self.beta = (1.0 - share) * begin[0] + share * beta if k < steps else beta
             self.theta = (1.0 - share) * begin[1] + share * theta if k < steps else theta
-            self.sim.advance(self._collider(), MORPH_DT, inertia=False)
+            self._advance(MORPH_DT, inertia=False)
             if tick is not None:
                 tick()
 
@@ -95,7 +103,7 @@ class WornGarment:
         before = (self.theta, self.translation)
         self.theta, self.translation = theta, translation
         try:
-            self.sim.advance(self._collider(), dt)
+            self._advance(dt, inertia=True)
         except Exception:
             self.theta, self.translation = before
             raise

@@ -234,6 +234,25 @@ def guard_pairs(
 
 
 @wp.kernel
+def mark_near(
+    x: wp.array(dtype=wp.vec3d),
+    pairs: wp.array(dtype=wp.vec4i),
+    distance: wp.array(dtype=wp.float64),
+    is_edge_edge: bool,
+    within: wp.float64,
+    near: wp.array(dtype=wp.int32),
+):
+    """near[i] = 1 for the vertices of pairs that are less than `within` apart."""
+    k = wp.tid()
+    if distance[k] >= within:
+        return
+    pair = pairs[k]
+    if wp.length(difference(closest(is_edge_edge, pair, x), pair, x)) < within:
+        for i in range(int(0), int(4)):
+            near[pair[i]] = 1
+
+
+@wp.kernel
 def active_pairs(
     x: wp.array(dtype=wp.vec3d),
     reference: wp.array(dtype=wp.vec3d),

@@ -2,11 +2,11 @@
 
 Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the
 body there, and only there: a vertex whose surroundings along its outward normal are taken by another part of
-the body within `ROOM` is drawn inwards, where cloth is near,
+the body within the gap g is drawn inwards, where cloth is near,
 
     s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
 
-g the gap and t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between
+t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between
 them. The displacement is continuous in t: when limbs part, the collider turns back into the body and the
 cloth between them comes out on the right side. In a crease the ray that measures the depth may run along the
 other part and meet it far away: s grows by no more than the way along the surface, `STEEPEST`, at which
@@ -26,8 +26,10 @@ from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 wp.set_module_options({"enable_backward": False})
 
 ROOM = 3.0e-3
-"""Metres of free distance that a vertex needs to stay where it is; less than what a masked face must show,
-since faces and vertices have different normals."""
+"""Metres of free distance that cloth of fine triangles needs between two parts of a body."""
+
+LIMB = 0.04
+"""Radius of a thin limb, metres: cloth is straight along edges, and needs more room the longer they are."""
 
 REACH = 0.08
 """Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
@@ -84,11 +86,31 @@ def free_distance(
         out[i] = wp.min(first, reach)
 
 
-class SelfClearance:
-    """Turns a body into its collider, frame by frame. `faces` (M, 3) must bound a closed body."""
+def differs(vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which vertices (N,) of the collider are elsewhere than those of the body."""
+    moved = np.abs(vertices - collider) > SAME
+    return np.asarray(moved.any(axis=1))
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int32], device: str) -> None:
+
+def room_for(rest_area: NDArray[np.float64]) -> float:
+    """The gap g, m, that cloth of triangles of such areas, m^2, needs: `ROOM` + L^2 / (8 `LIMB`).
+
+    The second term is the height of an arc of that radius over an edge of the mean length L.
+    """
+    return ROOM + 4.0 / np.sqrt(3.0) * float(rest_area.mean()) / (8.0 * LIMB)
+
+
+class SelfClearance:
+    """Turns a body into its collider, frame by frame.
+
+    `faces` (M, 3) must bound a closed body; `room` is the gap g, metres.
+    """
+
+    def __init__(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int32], device: str, room: float = ROOM
+    ) -> None:
         self.faces = faces
+        self.room = room
         self.device = device
         self._points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device)
         self._normals = wp.zeros(len(vertices), dtype=wp.vec3, device=device)
@@ -114,7 +136,7 @@ class SelfClearance:
         """
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals)
-        inwards = np.where(free < 0.0, 0.5 * ROOM - free, 0.5 * np.maximum(ROOM - free, 0.0))
+        inwards = np.where(free < 0.0, 0.5 * self.room - free, 0.5 * np.maximum(self.room - free, 0.0))
         self._flatten(inwards, vertices)
         moved = inwards > 0.0
         crowded = np.flatnonzero(moved)
@@ -145,7 +167,7 @@ class SelfClearance:
 
     def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
         """Indices of the faces on which `collider` differs from the body."""
-        moved = (np.abs(vertices - collider) > SAME).any(axis=1)
+        moved = differs(vertices, collider)
         return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
 
     def _free_distance(
@@ -154,6 +176,6 @@ class SelfClearance:
         self._points.assign(vertices.astype(np.float32))
         self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()
-        args = [self._mesh.id, self._points, self._normals, ROOM, REACH, self._free]
+        args = [self._mesh.id, self._points, self._normals, self.room, REACH, self._free]
         wp.launch(free_distance, len(vertices), args, device=self.device)
         return self._free.numpy().astype(np.float64)

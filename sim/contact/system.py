@@ -16,6 +16,7 @@ from muslin.sim.contact.barrier import (
     barrier_value,
     guard_pairs,
     lower_distances,
+    mark_near,
 )
 from muslin.sim.contact.ccd import cut_fractions, go_part_of_way, largest_safe_step
 from muslin.sim.contact.friction import (
@@ -86,6 +87,7 @@ class ContactSystem:
         self._before, self._fraction, self._after = (
             wp.zeros(n, dtype=wp.float64, device=device) for _ in range(3)
         )
+        self._near = wp.zeros(n, dtype=wp.int32, device=device)
         self._cut = wp.zeros(1, dtype=wp.int32, device=device)
         self.friction.bristle = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
         self._bristle_total = wp.zeros(self.num_cloth, dtype=wp.vec3d, device=device)
@@ -219,6 +221,15 @@ class ContactSystem:
     def forget_friction(self) -> None:
         """Friction lets go of what it holds."""
         self.friction.bristle.zero_()
+
+    def near(self, x: wp.array, within: float) -> NDArray[np.bool_]:
+        """Which vertices (V + N,) are of a pair less than `within` metres apart."""
+        self._near.zero_()
+        for pairs in self.lists:
+            if pairs.length:
+                args = [x, pairs.pairs, pairs.distance, pairs.is_edge_edge, within, self._near]
+                wp.launch(mark_near, pairs.length, args, device=self.device)
+        return self._near.numpy() > 0
 
     def smallest_distance(self, x: wp.array) -> float:
         """Smallest distance among the listed pairs, m; infinity where none is listed.

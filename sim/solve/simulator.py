@@ -22,6 +22,7 @@ from muslin.sim.air import AirDrag
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.carry import Carry
 from muslin.sim.contact.system import ContactSettings, ContactSystem
+from muslin.sim.contact.yielding import yield_to_cloth
 from muslin.sim.elastic import ElasticEnergy
 from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.inertia import quadratic_gradient, quadratic_value, step_along
@@ -33,8 +34,9 @@ class ClothSimulator:
     """State of one cloth and one collider: positions, velocities, time stepping.
 
     `positions` (V, 3) and `collider_vertices` (N, 3), metres, must not intersect. `pins` (V,) marks vertices
-    that go where `advance` tells them. `work_left`: Newton iterations that may still be spent, for the caller
-    to set; the step that would need more ends with SimulationError.
+    that go where `advance` tells them, `yielding` (N,) those of the collider that need not where they squeeze
+    the cloth: there they go along with what is opposite. `work_left`: Newton iterations that may still be
+    spent, for the caller to set; the step that would need more ends with SimulationError.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class ClothSimulator:
         self._energy_here: float | None = None
         self.velocity = np.zeros((n, 3))
         self.pins = np.zeros(n, bool)
+        self.yielding = np.zeros(len(collider_vertices), bool)
         self.work_left = np.inf
         self._gravity = wp.vec3d(*self.settings.gravity)
         self.contact.search.renew(self.x)
@@ -212,8 +215,11 @@ class ClothSimulator:
                 arrived = fraction < 1e-9
                 if not arrived and advances >= s.max_advances:
                     return False
-                # A short way means that something is squeezed: let it give way before the collider goes on.
-                relaxing = s.relaxations if safe < 0.5 and not arrived else 0
+                relaxing = 0
+                if safe < 0.5 and not arrived:
+                    # Something is squeezed: let it give way before the collider goes on.
+                    relaxing = s.relaxations
+                    yield_to_cloth(self.contact, self.yielding, self.x, remaining)
                 continue
             size, step = self._relax(led, dt, report)
             relaxing = max(relaxing - 1, 0)

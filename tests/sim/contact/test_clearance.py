@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from muslin.sim.body.interior import MASK_GAP_M, interior_points, masked_face_is_interior
-from muslin.sim.contact.clearance import ROOM, STEEPEST, SelfClearance
+from muslin.sim.contact.clearance import LIMB, ROOM, STEEPEST, SelfClearance, room_for
 from muslin.sim.dataset.intersections import count_intersections
 
 RADIUS = 0.1
@@ -120,3 +120,19 @@ def test_displacement_grows_no_faster_than_the_way_from_the_crease():
     length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
     assert drawn.max() > 0.02
     assert (np.abs(drawn[edges[:, 0]] - drawn[edges[:, 1]]) <= 2.0 * STEEPEST * length + 1e-9).all()
+
+
+def test_coarse_cloth_has_the_height_of_an_arc_over_its_edges_more_room():
+    edge = 0.04
+    triangles = np.full(7, np.sqrt(3.0) / 4.0 * edge**2)
+    arc = LIMB - np.sqrt(LIMB**2 - 0.25 * edge**2)
+    assert room_for(triangles) - ROOM == pytest.approx(arc, rel=0.1)
+    vertices, faces = two_spheres(-0.01)
+    n = len(BALL.vertices)
+    gaps = []
+    for room in (room_for(triangles), ROOM):
+        collider = SelfClearance(vertices, faces, "cpu", room).collider(vertices, CLOTH)
+        middle = np.linalg.norm(vertices[:, 1:], axis=1) < 0.01
+        left, right = collider[:n][middle[:n]], collider[n:][middle[n:]]
+        gaps.append(right[:, 0].min() - left[:, 0].max())
+    assert gaps[0] - gaps[1] == pytest.approx(room_for(triangles) - ROOM, rel=0.1)

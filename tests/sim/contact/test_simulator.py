@@ -8,6 +8,7 @@ from muslin.sim.cloth import build_cloth
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.material import load_fabric
+from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
 
@@ -122,3 +123,36 @@ def test_patch_slides_with_coulombs_acceleration(grid_mesh, degrees, friction):
     speeds = incline_speeds(grid_mesh, degrees, friction, 30, 0.01)
     expected = GRAVITY * (np.sin(slope) - friction * np.cos(slope))
     np.testing.assert_allclose((speeds[-1] - speeds[9]) / 0.2, expected, rtol=0.1)
+
+
+@pytest.mark.parametrize("yielding", [False, True])
+def test_plates_that_would_meet_in_cloth_stop_only_where_they_may_yield(grid_mesh, yielding):
+    """The upper plate is told to go 2 mm below the lower one, with cloth between, then up again."""
+    plate = grid_mesh(4, 4, 0.05)
+    low, high = level(plate, 0.0), level(plate, 0.006)
+    faces = np.concatenate([plate.faces, plate.faces[:, ::-1] + len(low)]).astype(np.int32)
+    mesh = grid_mesh(5, 5, 0.02)
+    sim = ClothSimulator(
+        build_cloth(mesh, load_fabric("gray-interlock")),
+        level(mesh, 0.003),
+        np.concatenate([low, high]),
+        faces,
+    )
+    sim.yielding[len(low) :] = yielding
+    goal = np.concatenate([low, level(plate, -0.002)])
+    if not yielding:
+        with pytest.raises(SimulationError, match="cannot go on without touching"):
+            sim.advance(goal, 1 / 60)
+        return
+    for _ in range(3):
+        sim.advance(goal, 1 / 60)
+        assert_apart(sim, faces)
+    np.testing.assert_allclose(sim.collider_vertices[: len(low)], low, atol=1e-12)
+    heights = sim.collider_vertices[len(low) :, 1]
+    middle = np.linalg.norm(low, axis=1) < 0.03
+    assert middle.any()
+    assert (heights[middle] > 0.0).all()
+    assert (heights[middle] < 0.005).all(), "it goes as far as the cloth lets it"
+    sim.advance(np.concatenate([low, high]), 1 / 60)
+    np.testing.assert_allclose(sim.collider_vertices[len(low) :], high, atol=1e-12)
+    assert_apart(sim, faces)
