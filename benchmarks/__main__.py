@@ -128,6 +128,30 @@ def rest(
 
 
 @app.command()
+def steps(
+    setting: Setting = OUT / "setting.npz",
+    warm_up: Annotated[int, typer.Option(min=0, help="Frames before the first that is measured.")] = 24,
+    count: Annotated[int, typer.Option(min=1, help="Frames that are measured.")] = 8,
+    out: Out = OUT,
+    core: Core = 0,
+) -> None:
+    """How far steps of few Newton iterations are from solved ones, and what they cost."""
+    from benchmarks.isolated import held_to
+    from benchmarks.setting import load_setting
+    from benchmarks.steps import step_figures
+
+    choices = [(4, 0.1), (4, 0.001), (3, 0.1), (3, 0.001), (2, 0.001)]
+    with held_to({core}):
+        found = step_figures(load_setting(setting), choices, warm_up, count)
+    for row in found:
+        typer.echo(
+            f"{row.max_iterations} iterations, linear_tolerance {row.linear_tolerance}: "
+            f"mean {row.mean:.2f}, p99 {row.p99:.2f} mm, {row.cpu_ms:.0f} CPU ms"
+        )
+    _write(out / "steps.json", [asdict(row) for row in found])
+
+
+@app.command()
 def workers(
     samples: Annotated[int, typer.Option(min=2, help="Drapes to make, each from the sewn start.")] = 4,
     edge_length: Annotated[float, typer.Option(help="Of the cloth, metres.")] = 0.0142,
