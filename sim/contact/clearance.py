@@ -21,7 +21,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
+from muslin.sim.body.interior import MASK_GAP_M
 
 wp.set_module_options({"enable_backward": False})
 
@@ -40,6 +40,9 @@ NEAR_CLOTH = 0.03
 SAME = 1.0e-8
 """Metres below which collider and body do not differ: the rounding of a move that is made in parts."""
 
+SURE = 1.0e-4
+"""Metres by which a face passes the test of masked faces sooner than it must: they round differently."""
+
 MAX_HITS = 12
 
 STEEPEST = 1.0
@@ -51,12 +54,19 @@ def free_distance(
     mesh: wp.uint64,
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
+    near: wp.array(dtype=wp.int32),
     gap: float,
     reach: float,
     out: wp.array(dtype=float),
 ):
-    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside."""
+    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside.
+
+    Those not `near` are not looked at: `reach`.
+    """
     i = wp.tid()
+    if near[i] == 0:
+        out[i] = reach
+        return
     n = normals[i]
     offset = float(1.0e-4)
     origin = points[i] + n * offset
@@ -100,6 +110,54 @@ def room_for(rest_area: NDArray[np.float64]) -> float:
     return ROOM + 4.0 / np.sqrt(3.0) * float(rest_area.mean()) / (8.0 * LIMB)
 
 
+@wp.func
+def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float:
+    """Winding number of a closed surface at a point: the signed crossings of a ray from there."""
+    winding = float(0.0)
+    travelled = float(0.0)
+    for _ in range(2 * MAX_HITS):
+        hit = wp.mesh_query_ray(mesh, origin + direction * travelled, direction, 10.0)
+        if not hit.result:
+            break
+        winding += wp.sign(wp.dot(hit.normal, direction))
+        travelled += hit.t + 1.0e-4
+    return winding
+
+
+@wp.kernel
+def faces_with_body_in_front(
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    faces: wp.array2d(dtype=wp.int32),
+    chosen: wp.array(dtype=wp.int32),
+    gap: float,
+    found: wp.array(dtype=wp.int32),
+):
+    """found = 1 where a corner or the centroid of a face, moved by `gap` along its normal, is inside.
+
+    By two rays that must agree: one may run along an edge.
+    """
+    k = wp.tid()
+    a = points[faces[chosen[k], 0]]
+    b = points[faces[chosen[k], 1]]
+    c = points[faces[chosen[k], 2]]
+    front = wp.normalize(wp.cross(b - a, c - a)) * gap
+    one = wp.normalize(wp.vec3(0.31, 0.83, 0.46))
+    other = wp.normalize(wp.vec3(-0.71, 0.12, -0.69))
+    for j in range(int(0), int(4)):
+        p = (a + b + c) / 3.0
+        if j == 1:
+            p = a
+        elif j == 2:
+            p = b
+        elif j == 3:
+            p = c
+        p += front
+        if winding_along(mesh, p, one) > 0.5 and winding_along(mesh, p, other) > 0.5:
+            found[k] = 1
+            return
+
+
 class SelfClearance:
     """Turns a body into its collider, frame by frame.
 
@@ -114,8 +172,10 @@ class SelfClearance:
         self.device = device
         self._points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device)
         self._normals = wp.zeros(len(vertices), dtype=wp.vec3, device=device)
+        self._near = wp.zeros(len(vertices), dtype=wp.int32, device=device)
         self._free = wp.zeros(len(vertices), dtype=float, device=device)
-        self._mesh = wp.Mesh(self._points, wp.array(faces.ravel(), dtype=wp.int32, device=device))
+        self._triangles = wp.array(faces, dtype=wp.int32, ndim=2, device=device)
+        self._mesh = wp.Mesh(self._points, self._triangles.flatten())
         self._edges = igl.edges(faces.astype(np.int64))
         adjacency = igl.adjacency_matrix(faces.astype(np.int64)).astype(np.float64)
         degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
@@ -129,33 +189,49 @@ class SelfClearance:
     ) -> NDArray[np.float64]:
         """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
 
-        A vertex moves only if there is cloth near it, and if every face around it passes
-        `masked_face_is_interior`: so the faces on which collider and body differ are fit to be masked.
+        A vertex moves only if there is cloth near it, and if every face around it has the body in front of it
+        with `SURE` to spare: so the faces on which collider and body differ are fit to be masked
+        (`muslin.sim.body.interior.masked_face_is_interior`).
         `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
         """
+        beside = vertices if standing is None else standing
+        around = (beside > cloth.min(axis=0) - NEAR_CLOTH) & (beside < cloth.max(axis=0) + NEAR_CLOTH)
+        near = around.all(axis=1)
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
-        free = self._free_distance(vertices, normals)
+        free = self._free_distance(vertices, normals, near)
         inwards = np.where(free < 0.0, 0.5 * self.room - free, 0.5 * np.maximum(self.room - free, 0.0))
-        self._flatten(inwards, vertices)
+        self._flatten(inwards, vertices, near)
         moved = inwards > 0.0
         crowded = np.flatnonzero(moved)
-        beside = vertices if standing is None else standing
         distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=NEAR_CLOTH)
         moved[crowded[~np.isfinite(distance)]] = False
         faces = np.flatnonzero(moved[self.faces].any(axis=1))
         if len(faces) == 0:
             return vertices
-        exposed = faces[~masked_face_is_interior(vertices, self.faces, faces, MASK_GAP_M)]
+        exposed = faces[~self._have_body_in_front(faces)]
         moved[self.faces[exposed].ravel()] = False
         inwards = np.where(moved, inwards, 0.0)
         for _ in range(3):
             inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
         return vertices - inwards[:, None] * normals
 
-    def _flatten(self, inwards: NDArray[np.float64], vertices: NDArray[np.float64]) -> None:
-        """Lower `inwards` (N,) to the largest function below it that is nowhere steeper than `STEEPEST`."""
-        edges = self._edges[(inwards[self._edges] > 0.0).any(axis=1)]
+    def _have_body_in_front(self, faces: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether each of `faces` (K,) has, of the body as it is in the mesh."""
+        found = wp.zeros(len(faces), dtype=wp.int32, device=self.device)
+        chosen = wp.array(faces, dtype=wp.int32, device=self.device)
+        args = [self._mesh.id, self._points, self._triangles, chosen, MASK_GAP_M - SURE, found]
+        wp.launch(faces_with_body_in_front, len(faces), args, device=self.device)
+        return found.numpy() > 0
+
+    def _flatten(
+        self, inwards: NDArray[np.float64], vertices: NDArray[np.float64], near: NDArray[np.bool_]
+    ) -> None:
+        """Lower `inwards` (N,) to the largest function below it that is nowhere steeper than `STEEPEST`.
+
+        Between vertices that are `near` (N,): of the others nothing is known.
+        """
+        edges = self._edges[(inwards[self._edges] > 0.0).any(axis=1) & near[self._edges].all(axis=1)]
         rise = STEEPEST * np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
         here, there = np.concatenate([edges, edges[:, ::-1]]).T
         rise = np.concatenate([rise, rise])
@@ -171,11 +247,13 @@ class SelfClearance:
         return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
 
     def _free_distance(
-        self, vertices: NDArray[np.float64], normals: NDArray[np.float64]
+        self, vertices: NDArray[np.float64], normals: NDArray[np.float64], near: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
+        """t (N,) of the vertices `near` (N,), metres; `REACH` for the others."""
         self._points.assign(vertices.astype(np.float32))
         self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()
-        args = [self._mesh.id, self._points, self._normals, self.room, REACH, self._free]
+        self._near.assign(near.astype(np.int32))
+        args = [self._mesh.id, self._points, self._normals, self._near, self.room, REACH, self._free]
         wp.launch(free_distance, len(vertices), args, device=self.device)
         return self._free.numpy().astype(np.float64)
