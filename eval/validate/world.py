@@ -34,7 +34,7 @@ def exact(
         damping=0.0,
         drag=0.0,
         tolerance=tolerance,
-        max_iterations=100,
+        max_iterations=400,
         linear_tolerance=linear_tolerance,
         max_linear_iterations=4000,
     )

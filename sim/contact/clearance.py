@@ -41,7 +41,7 @@ SAME = 1.0e-8
 """Metres below which collider and body do not differ: the rounding of a move that is made in parts."""
 
 SURE = 1.0e-4
-"""Metres by which a face passes the test of masked faces sooner than it must: they round differently."""
+"""Metres, along a ray, within which a point counts as on a surface, not inside: rounding decides there."""
 
 MAX_HITS = 12
 
@@ -112,13 +112,18 @@ def room_for(rest_area: NDArray[np.float64]) -> float:
 
 @wp.func
 def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float:
-    """Winding number of a closed surface at a point: the signed crossings of a ray from there."""
+    """Winding number of a closed surface at a point: the signed crossings of a ray from there.
+
+    Zero, as if outside, for points on the surface itself.
+    """
     winding = float(0.0)
     travelled = float(0.0)
     for _ in range(2 * MAX_HITS):
         hit = wp.mesh_query_ray(mesh, origin + direction * travelled, direction, 10.0)
         if not hit.result:
             break
+        if travelled == 0.0 and hit.t < SURE:
+            return 0.0
         winding += wp.sign(wp.dot(hit.normal, direction))
         travelled += hit.t + 1.0e-4
     return winding
@@ -135,15 +140,15 @@ def faces_with_body_in_front(
 ):
     """found = 1 where a corner or the centroid of a face, moved by `gap` along its normal, is inside.
 
-    By two rays that must agree: one may run along an edge.
+    By two opposite rays that must agree: one may run along an edge or through two faces at once, and one
+    meets a surface that is close by.
     """
     k = wp.tid()
     a = points[faces[chosen[k], 0]]
     b = points[faces[chosen[k], 1]]
     c = points[faces[chosen[k], 2]]
     front = wp.normalize(wp.cross(b - a, c - a)) * gap
-    one = wp.normalize(wp.vec3(0.31, 0.83, 0.46))
-    other = wp.normalize(wp.vec3(-0.71, 0.12, -0.69))
+    way = wp.normalize(wp.vec3(0.31, 0.83, 0.46))
     for j in range(int(0), int(4)):
         p = (a + b + c) / 3.0
         if j == 1:
@@ -153,7 +158,7 @@ def faces_with_body_in_front(
         elif j == 3:
             p = c
         p += front
-        if winding_along(mesh, p, one) > 0.5 and winding_along(mesh, p, other) > 0.5:
+        if winding_along(mesh, p, way) > 0.5 and winding_along(mesh, p, -way) > 0.5:
             found[k] = 1
             return
 
@@ -189,8 +194,8 @@ class SelfClearance:
     ) -> NDArray[np.float64]:
         """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
 
-        A vertex moves only if there is cloth near it, and if every face around it has the body in front of it
-        with `SURE` to spare: so the faces on which collider and body differ are fit to be masked
+        A vertex moves only if there is cloth near it, and if every face around it has the body in front of it:
+        so the faces on which collider and body differ are fit to be masked
         (`muslin.sim.body.interior.masked_face_is_interior`).
         `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
@@ -220,7 +225,7 @@ class SelfClearance:
         """Whether each of `faces` (K,) has, of the body as it is in the mesh."""
         found = wp.zeros(len(faces), dtype=wp.int32, device=self.device)
         chosen = wp.array(faces, dtype=wp.int32, device=self.device)
-        args = [self._mesh.id, self._points, self._triangles, chosen, MASK_GAP_M - SURE, found]
+        args = [self._mesh.id, self._points, self._triangles, chosen, MASK_GAP_M, found]
         wp.launch(faces_with_body_in_front, len(faces), args, device=self.device)
         return found.numpy() > 0
 
