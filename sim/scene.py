@@ -108,7 +108,7 @@ class SolverTable(Table):
     damping: Annotated[float, Field(ge=0.0, le=1.0)] = 2.0e-3
     drag: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
     tolerance: Annotated[float, Field(ge=1e-7, le=1e-2)] = 5.0e-4
-    max_iterations: Annotated[int, Field(ge=1, le=200)] = 3
+    max_iterations: Annotated[int, Field(ge=1, le=200)] = 4
     max_work: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
     contact_range: Annotated[float, Field(ge=5e-4, le=1e-2)] = 2.0e-3
     contact_stiffness: Positive = 1.0

@@ -25,10 +25,10 @@ from muslin.sim.body.interior import MASK_GAP_M
 
 wp.set_module_options({"enable_backward": False})
 
-ROOM = 3.0e-3
+ROOM = 4.0e-3
 """Metres of free distance that cloth of fine triangles needs between two parts of a body."""
 
-LIMB = 0.04
+LIMB = 0.03
 """Radius of a thin limb, metres: cloth is straight along edges, and needs more room the longer they are."""
 
 REACH = 0.08
@@ -194,9 +194,9 @@ class SelfClearance:
     ) -> NDArray[np.float64]:
         """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
 
-        A vertex moves only if there is cloth near it, and if every face around it has the body in front of it:
-        so the faces on which collider and body differ are fit to be masked
-        (`muslin.sim.body.interior.masked_face_is_interior`).
+        A vertex moves only if there is cloth near it, and every face around it has the body in front. So the
+        faces on which collider and body differ may be masked:
+        `muslin.sim.body.interior.masked_face_is_interior`.
         `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
         """

@@ -48,7 +48,8 @@ def split_motions(
 ):
     """Split the motions p of the vertices `touched` by each set.
 
-    `again`: only those sets have changed of whose vertices some go only a `fraction` of their way.
+    `again`: only those sets have changed of whose vertices some go only a `fraction` of their way. A radius
+    below zero says that nothing is known of where the set is.
     """
     k = wp.tid()
     begin = offsets[k]
@@ -66,13 +67,10 @@ def split_motions(
     square = zero
     for j in range(begin, end):
         square = wp.max(square, wp.length_sq(p[touched[j, 0]]))
-    motion.way[k] = wp.sqrt(square)
-    if square == zero:
-        motion.mean[k] = wp.vec3d()
-        motion.spin[k] = wp.vec3d()
-        motion.rest[k] = zero
-        motion.spread[k] = zero
+    if square == zero and motion.way[k] == zero and motion.radius[k] >= zero:
+        # Still at rest: all is as it was.
         return
+    motion.way[k] = wp.sqrt(square)
     c = wp.vec3d()
     m = wp.vec3d()
     for j in range(begin, end):

@@ -48,6 +48,10 @@ class _Sets:
             setattr(self.motion, name, wp.zeros(self.count, dtype=wp.float64, device=device))
         self.motion.changed = wp.zeros(self.count, dtype=wp.int32, device=device)
 
+    def forget(self) -> None:
+        """The points may be elsewhere than where their motions were split last."""
+        self.motion.radius.fill_(-1.0)
+
     def split_motions(self, *args: object) -> None:
         wp.launch(split_motions, self.count, [*self.rows, *args, self.motion], device=self.device)
 
@@ -143,6 +147,8 @@ class PairSearch:
     def _forget(self) -> None:
         """Leave nothing listed, and nothing known of how far apart things are."""
         self._spent = False
+        self._patches.forget()
+        self._groups.forget()
         self._opened.zero_()
         self._patch_pairs.slack.fill_(-1.0)
         self._num_group_pairs.zero_()

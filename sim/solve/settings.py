@@ -13,20 +13,21 @@ class SolverSettings:
     largest Newton step at which a time step counts as solved; `min_iterations` and `max_iterations` of Newton
     once the collider has arrived, `max_advances` before, with `relaxations` in between where the way was
     short; `guards`: how often a direction that runs into contact is turned aside; `max_move` m an iteration;
-    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`; `air`, or None for a vacuum."""
+    `linear_tolerance` of `muslin.sim.solve.conjugate_gradients`, a tenth of it while the collider advances;
+    `air`, or None for a vacuum."""
 
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     damping: float = 2.0e-3
     drag: float = 0.5
     tolerance: float = 5.0e-4
     min_iterations: int = 2
-    max_iterations: int = 3
+    max_iterations: int = 4
     max_advances: int = 30
     relaxations: int = 2
     guards: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
-    linear_tolerance: float = 1.0e-3
+    linear_tolerance: float = 1.0e-2
     max_linear_iterations: int = 400
     max_splits: int = 4
     air: AirSettings | None = None

@@ -91,6 +91,22 @@ def test_points_come_together_by_no_more_than_is_said(seed):
     assert rigid < 1e-5 * np.linalg.norm(common, axis=1).max()
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_points_come_near_a_large_set_at_rest_by_no_more_than_is_said(seed):
+    """A cloud turns and falls beside a floor of some metres, whose centre is elsewhere."""
+    draw = np.random.default_rng(seed)
+    floor = np.array([[-2.0, 0, -1], [-1, 0, 4], [6, 0, 5], [7, 0, -5]])
+    spread = np.concatenate([floor, 0.5 * (floor + np.roll(floor, 1, axis=0)), floor.mean(axis=0)[None]])
+    points = np.concatenate([0.03 * draw.normal(size=(12, 3)) + [0.5, 0.1, 0.2], spread])
+    moves = np.cross(draw.normal(size=3), points - points[0]) + 0.1 * draw.normal(size=3)
+    moves[12:] = 0.0
+    bound = measured_approach(points, moves)
+    before = np.linalg.norm(points[:12, None] - points[None, 12:], axis=2)
+    after = np.linalg.norm((points + moves)[:12, None] - points[None, 12:], axis=2)
+    assert (before - after).max() <= bound * (1.0 + 1e-12)
+    assert moves[:12, 1].min() >= -bound * (1.0 + 1e-12), "the way down to the plane itself"
+
+
 def measured_approach(points: np.ndarray, moves: np.ndarray) -> float:
     motion = SetMotion()
     for name in ("centre", "mean", "spin"):
@@ -101,6 +117,7 @@ def measured_approach(points: np.ndarray, moves: np.ndarray) -> float:
     offsets = wp.array([0, 12, 21], dtype=wp.int32, device="cpu")
     touched = wp.array(np.arange(21)[:, None], dtype=wp.int32, ndim=2, device="cpu")
     x, p = (wp.array(values, dtype=wp.vec3d, device="cpu") for values in (points, moves))
+    motion.radius.fill_(-1.0)
     whole = wp.ones(21, dtype=wp.float64, device="cpu")
     wp.launch(split_motions, 2, [offsets, touched, x, p, False, whole, motion], device="cpu")
     out = wp.zeros(1, dtype=wp.float64, device="cpu")

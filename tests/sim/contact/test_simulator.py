@@ -156,3 +156,19 @@ def test_plates_that_would_meet_in_cloth_stop_only_where_they_may_yield(grid_mes
     sim.advance(np.concatenate([low, high]), 1 / 60)
     np.testing.assert_allclose(sim.collider_vertices[len(low) :], high, atol=1e-12)
     assert_apart(sim, faces)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sheet_dropped_on_edge_stays_above_a_wide_floor(grid_mesh, seed):
+    """A floor at rest whose triangles are a hundred times those of the cloth, which tumbles."""
+    mesh = grid_mesh(9, 9, 0.04)
+    flat = mesh.panel_vertices - mesh.panel_vertices.mean(axis=0)
+    wavy = 0.01 * np.sin(20.0 * flat[:, 1]) + 1e-3 * np.random.default_rng(seed).normal(size=len(flat))
+    floor = np.array([[-5.0, -0.19, -3], [-5, -0.19, 4], [6, -0.19, 5], [7, -0.19, -5]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    start = np.stack([flat[:, 0], flat[:, 1], wavy], axis=1)
+    sim = ClothSimulator(build_cloth(mesh, load_fabric("gray-interlock")), start, floor, faces)
+    for _ in range(15):
+        sim.advance(None, 1 / 30)
+        assert_apart(sim, faces)
+    assert np.ptp(sim.positions[:, 1]) < 0.3
