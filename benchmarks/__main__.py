@@ -140,7 +140,7 @@ def steps(
     from benchmarks.setting import load_setting
     from benchmarks.steps import step_figures
 
-    choices = [(4, 0.1), (4, 0.001), (3, 0.1), (3, 0.001), (2, 0.001)]
+    choices = [(4, 0.1), (4, 0.01), (4, 0.001), (3, 0.01), (3, 0.001)]
     with held_to({core}):
         found = step_figures(load_setting(setting), choices, warm_up, count)
     for row in found:

@@ -315,9 +315,8 @@ class ClothSimulator:
         size = float(np.sqrt((p[:n] ** 2).sum(axis=1).max()))
         if not np.isfinite(size):
             raise SimulationError("the Newton direction is not finite: the cloth has a collapsed triangle")
-        limit = min(1.0, s.max_move / max(size, 1e-30))
+        limit = 1.0 if told is not None else min(1.0, s.max_move / max(size, 1e-30))
         if told is not None:
-            limit = 1.0
             # Squeezed cloth may ask to go anywhere: no further than what leads it and `max_move`.
             bound = s.max_move + np.linalg.norm(told, axis=1).max(initial=0.0)
             p[:n] *= bound / np.maximum(np.linalg.norm(p[:n], axis=1, keepdims=True), bound)

@@ -124,7 +124,7 @@ def test_displacement_grows_no_faster_than_the_way_from_the_crease():
 
 
 def test_coarse_cloth_has_the_height_of_an_arc_over_its_edges_more_room():
-    edge = 0.04
+    edge = 0.02
     triangles = np.full(7, np.sqrt(3.0) / 4.0 * edge**2)
     arc = LIMB - np.sqrt(LIMB**2 - 0.25 * edge**2)
     assert room_for(triangles) - ROOM == pytest.approx(arc, rel=0.1)
