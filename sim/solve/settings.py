@@ -27,7 +27,7 @@ class SolverSettings:
     guards: int = 2
     max_move: float = 0.03
     max_backtracks: int = 12
-    linear_tolerance: float = 1.0e-2
+    linear_tolerance: float = 0.1
     max_linear_iterations: int = 400
     max_splits: int = 4
     air: AirSettings | None = None
