@@ -8,6 +8,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+OPEN = wp.constant(wp.float64(1.0e300))
+"""Slack, m, of two opened patches: from then on that of their groups counts."""
+
 
 @wp.struct
 class Boxes:
@@ -83,14 +86,13 @@ def boxes_of_primitives(
 @wp.kernel
 def open_patches(
     hot_pairs: wp.array(dtype=wp.int32),
-    num_patches: int,
+    pairs: wp.array(dtype=wp.vec2i),
     boxes: Boxes,
     group_offsets: wp.array(dtype=wp.int32),
     range_: wp.float64,
     ahead: wp.float64,
     slack: wp.array(dtype=wp.float64),
     cost: wp.array(dtype=wp.float64),
-    opened: wp.array(dtype=wp.int32),
     count: wp.array(dtype=wp.int32),
     groups: wp.array(dtype=wp.vec2i),
     group_slack: wp.array(dtype=wp.float64),
@@ -99,14 +101,14 @@ def open_patches(
 
     The others get the slack that they have.
     """
-    ab = hot_pairs[wp.tid()]
-    a = ab // num_patches
-    b = ab - a * num_patches
+    k = hot_pairs[wp.tid()]
+    a = pairs[k][0]
+    b = pairs[k][1]
     left = gap_between(boxes.low[a], boxes.high[a], boxes.low[b], boxes.high[b]) - range_
-    if left > cost[ab] + ahead:
-        slack[ab] = left
+    if left > cost[k] + ahead:
+        slack[k] = left
         return
-    opened[ab] = 1
+    slack[k] = OPEN
     for g in range(group_offsets[a], group_offsets[a + 1]):
         first = group_offsets[b]
         if a == b:

@@ -123,44 +123,8 @@ def approach(motion: SetMotion, a: int, b: int) -> wp.float64:
 
 
 @wp.kernel
-def find_hot_patches(
-    motion: SetMotion,
-    num_patches: int,
-    spent: bool,
-    opened: wp.array(dtype=wp.int32),
-    slack: wp.array(dtype=wp.float64),
-    cost: wp.array(dtype=wp.float64),
-    wanted: wp.array(dtype=wp.int32),
-    count: wp.array(dtype=wp.int32),
-    out: wp.array(dtype=wp.int32),
-):
-    """List those pairs a `num_patches` + b of patches, not yet `opened`, that may use up their `slack`.
-
-    `cost` is what the move takes of the slack once it is made; that of the last one, if it has been `spent`,
-    is taken off first.
-    """
-    ab = wp.tid()
-    a = ab // num_patches
-    b = ab - a * num_patches
-    if b < a or opened[ab] != 0:
-        return
-    left = slack[ab]
-    if spent:
-        left -= cost[ab]
-        slack[ab] = left
-    price = motion.way[a] + motion.way[b]
-    if price > CHEAP * left:
-        price = wp.min(price, approach(motion, a, b))
-    cost[ab] = price
-    if price > left:
-        wanted[a] = 1
-        wanted[b] = 1
-        out[wp.atomic_add(count, 0, 1)] = ab
-
-
-@wp.kernel
-def find_hot_groups(
-    groups: wp.array(dtype=wp.vec2i),
+def find_hot_pairs(
+    pairs: wp.array(dtype=wp.vec2i),
     motion: SetMotion,
     spent: bool,
     slack: wp.array(dtype=wp.float64),
@@ -171,27 +135,28 @@ def find_hot_groups(
     count: wp.array(dtype=wp.int32),
     out: wp.array(dtype=wp.int32),
 ):
-    """The same for the pairs of `groups`, which are marked as `hot`; those that have not changed are not.
+    """Mark as `hot`, and list, those `pairs` of changed sets that may use up their `slack`.
 
-    `most` is what points of the two can at most come together by.
+    `cost` is what the move takes of the slack once it is made; that of the last one, if it has been `spent`,
+    is taken off first. `most` is what points of the two can at most come together by.
     """
     k = wp.tid()
-    g = groups[k][0]
-    h = groups[k][1]
+    a = pairs[k][0]
+    b = pairs[k][1]
     hot[k] = 0
-    if motion.changed[g] + motion.changed[h] == 0:
+    if motion.changed[a] + motion.changed[b] == 0:
         return
     left = slack[k]
     if spent:
         left -= cost[k]
         slack[k] = left
-    price = motion.way[g] + motion.way[h]
+    price = motion.way[a] + motion.way[b]
     if price > CHEAP * left:
-        price = wp.min(price, approach(motion, g, h))
+        price = wp.min(price, approach(motion, a, b))
     cost[k] = price
     most[k] = price
     if price > left:
         hot[k] = 1
-        wanted[g] = 1
-        wanted[h] = 1
+        wanted[a] = 1
+        wanted[b] = 1
         out[wp.atomic_add(count, 0, 1)] = k

@@ -16,12 +16,7 @@ from muslin.sim.contact.broad_phase import (
 )
 from muslin.sim.contact.narrow_phase import GroupPrimitives, find_near_edges, find_near_faces
 from muslin.sim.contact.pair_list import PairList
-from muslin.sim.contact.patch_motion import (
-    SetMotion,
-    find_hot_groups,
-    find_hot_patches,
-    split_motions,
-)
+from muslin.sim.contact.patch_motion import SetMotion, find_hot_pairs, split_motions
 from muslin.sim.contact.patches import Patches, Rows, cut_into_patches
 
 AHEAD = 0.005
@@ -66,13 +61,27 @@ class _SetPairs:
     range. Hot are those that may use it up.
     """
 
-    def __init__(self, capacity: int, device: str) -> None:
+    def __init__(self, pairs: NDArray[np.int32], device: str) -> None:
+        self.device = device
+        self.pairs = wp.array(pairs, dtype=wp.vec2i, device=device)
+        capacity = len(pairs)
         self.slack = wp.full(capacity, -1.0, dtype=wp.float64, device=device)
         self.cost = wp.zeros(capacity, dtype=wp.float64, device=device)
         self.most = wp.zeros(capacity, dtype=wp.float64, device=device)
         self.hot = wp.zeros(capacity, dtype=wp.int32, device=device)
         self.hot_pairs = wp.zeros(capacity, dtype=wp.int32, device=device)
-        self.num_hot = wp.zeros(1, dtype=wp.int32, device=device)
+        self._num_hot = wp.zeros(1, dtype=wp.int32, device=device)
+
+    def find_hot(self, count: int, sets: _Sets, spent: bool) -> int:
+        """How many of the first `count` pairs are hot; their numbers stand in `hot_pairs`.
+
+        The sets of those are `wanted`. `spent`: the move that was looked at last has been made.
+        """
+        self._num_hot.zero_()
+        args = [self.pairs, sets.motion, spent, self.slack, self.cost, self.most, self.hot]
+        args += [sets.wanted, self._num_hot, self.hot_pairs]
+        wp.launch(find_hot_pairs, count, args, device=self.device)
+        return int(self._num_hot.numpy()[0])
 
 
 class PairSearch:
@@ -103,15 +112,15 @@ class PairSearch:
         self._primitives = _primitives(cut, device)
         self._edge_boxes = _boxes(len(cut.edges.rows), device)
         self._face_boxes = _boxes(len(cut.faces.rows), device)
-        self._patch_pairs = _SetPairs(cut.num_cloth * cut.count, device)
-        self._opened = wp.zeros(cut.num_cloth * cut.count, dtype=wp.int32, device=device)
+        upper = np.argwhere(np.tri(cut.num_cloth, cut.count, -1) == 0)
+        self._patch_pairs = _SetPairs(upper.astype(np.int32), device)
         self._num_group_pairs = wp.zeros(1, dtype=wp.int32, device=device)
         self._reserve_groups(40 * self._groups.count)
         self._spent = False
         self._whole = wp.full(len(points), 1.0, dtype=wp.float64, device=device)
         self.still = wp.zeros(len(points), dtype=wp.vec3d, device=device)
         n = cloth.num_vertices
-        self.lists = [PairList(False, 16 * n, device), PairList(True, 48 * n, device)]
+        self.lists = [PairList(False, 8 * n, device), PairList(True, 16 * n, device)]
 
     def renew(self, x: wp.array) -> None:
         """Forget where things were, and list the pairs at x."""
@@ -149,7 +158,6 @@ class PairSearch:
         self._spent = False
         self._patches.forget()
         self._groups.forget()
-        self._opened.zero_()
         self._patch_pairs.slack.fill_(-1.0)
         self._num_group_pairs.zero_()
         self.num_group_pairs = self._fewest = 0
@@ -157,24 +165,18 @@ class PairSearch:
             pairs.length = 0
 
     def _reserve_groups(self, capacity: int) -> None:
-        self._group_pairs = _SetPairs(capacity, self.device)
-        self._pairs_of_groups = wp.zeros(capacity, dtype=wp.vec2i, device=self.device)
+        self._group_pairs = _SetPairs(np.zeros((capacity, 2), np.int32), self.device)
         self.num_group_pairs = self._fewest = 0
 
     def _open_patches(self, x: wp.array) -> bool:
         """Pairs of groups for patches that come near each other; False if these have become too many."""
         patches, pairs, groups = self._patches, self._patch_pairs, self._group_pairs
-        pairs.num_hot.zero_()
-        args = [patches.motion, patches.count, self._spent, self._opened, pairs.slack, pairs.cost]
-        args += [patches.wanted, pairs.num_hot, pairs.hot_pairs]
-        wp.launch(find_hot_patches, len(pairs.slack), args, device=self.device)
-        num_hot = int(pairs.num_hot.numpy()[0])
+        num_hot = pairs.find_hot(len(pairs.pairs), patches, self._spent)
         if num_hot == 0:
             return True
         patches.bound(x)
-        args = [pairs.hot_pairs, patches.count, patches.boxes, self._group_offsets, self.range, AHEAD]
-        args += [pairs.slack, pairs.cost, self._opened]
-        args += [self._num_group_pairs, self._pairs_of_groups, groups.slack]
+        args = [pairs.hot_pairs, pairs.pairs, patches.boxes, self._group_offsets, self.range, AHEAD]
+        args += [pairs.slack, pairs.cost, self._num_group_pairs, groups.pairs, groups.slack]
         wp.launch(open_patches, num_hot, args, device=self.device)
         count = int(self._num_group_pairs.numpy()[0])
         if count > len(groups.slack):
@@ -188,11 +190,7 @@ class PairSearch:
     def _look(self, x: wp.array, p: wp.array) -> int | None:
         """List the primitives of hot groups anew; None if there were too many of them."""
         groups, pairs = self._groups, self._group_pairs
-        pairs.num_hot.zero_()
-        args = [self._pairs_of_groups, groups.motion, self._spent, pairs.slack, pairs.cost]
-        args += [pairs.most, pairs.hot, groups.wanted, pairs.num_hot, pairs.hot_pairs]
-        wp.launch(find_hot_groups, self.num_group_pairs, args, device=self.device)
-        num_hot = int(pairs.num_hot.numpy()[0])
+        num_hot = pairs.find_hot(self.num_group_pairs, groups, self._spent)
         if num_hot == 0:
             return 0
         groups.bound(x)
@@ -210,10 +208,10 @@ class PairSearch:
             (find_near_faces, 2 * num_hot, self._face_boxes, near),
             (find_near_edges, num_hot, self._edge_boxes, crossing),
         ):
-            args = [pairs.hot_pairs, self._pairs_of_groups, made, groups.boxes, boxes, x, p]
+            args = [pairs.hot_pairs, pairs.pairs, made, groups.boxes, boxes, x, p]
             args += [self.range + self.margin, pairs.cost, listed.found]
             wp.launch(kernel, count, args, device=self.device)
-        args = [pairs.hot_pairs, self._pairs_of_groups, groups.boxes, self.range, self.margin]
+        args = [pairs.hot_pairs, pairs.pairs, groups.boxes, self.range, self.margin]
         wp.launch(renew_slack, num_hot, [*args, pairs.slack, pairs.cost], device=self.device)
         enough = True
         for listed in self.lists:
