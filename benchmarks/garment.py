@@ -1,4 +1,4 @@
-"""The setting's cloth as muslin's own types."""
+"""The setting's cloth, and its walk, as muslin's own types."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import numpy as np
 from benchmarks.setting import Setting
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import ClothModel, build_cloth
+from muslin.sim.contact.clearance import SelfClearance, room_for
 from muslin.sim.scene import load_scene
-from muslin.sim.setting import fabric_of
+from muslin.sim.setting import fabric_of, settings_of
+from muslin.sim.solve.simulator import ClothSimulator
 
 SCENE = "scenes/tshirt_walk.toml"
 
@@ -34,3 +36,13 @@ def cloth_model(setting: Setting) -> ClothModel:
     """Its rest geometry in the fabric of the scene."""
     scene = load_scene(SCENE)
     return build_cloth(garment(setting), fabric_of(scene, scene.garment))
+
+
+def walk(setting: Setting) -> tuple[ClothSimulator, SelfClearance]:
+    """Its first frame, with the settings of the scene, and what makes colliders of its bodies."""
+    contact, solver = settings_of(load_scene(SCENE))
+    cloth = cloth_model(setting)
+    clearance = SelfClearance(setting.body[0], setting.body_faces, "cpu", room_for(cloth.rest_area))
+    collider = clearance.collider(setting.body[0], setting.positions)
+    sim = ClothSimulator(cloth, setting.positions, collider, setting.body_faces, contact, solver)
+    return sim, clearance

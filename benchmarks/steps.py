@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.garment import SCENE, cloth_model
+from benchmarks.garment import walk
 from benchmarks.setting import DT, Setting
-from muslin.sim.contact.clearance import SelfClearance, room_for
+from muslin.sim.contact.clearance import SelfClearance
 from muslin.sim.run import compile_kernels
-from muslin.sim.scene import load_scene
-from muslin.sim.setting import settings_of
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
+from muslin.sim.wear import advance_on_body
 
 
 @dataclass(frozen=True)
@@ -37,36 +36,33 @@ def step_figures(
     `choices`: `max_iterations` and `linear_tolerance`. The walk goes on by the settings of the scene.
     """
     compile_kernels("cpu")
-    contact, solver = settings_of(load_scene(SCENE))
-    cloth = cloth_model(setting)
-    clearance = SelfClearance(setting.body[0], setting.body_faces, "cpu", room_for(cloth.rest_area))
-    start = clearance.collider(setting.body[0], setting.positions)
-    sim = ClothSimulator(cloth, setting.positions, start, setting.body_faces, contact, solver)
+    sim, clearance = walk(setting)
+    solver = sim.settings
     found: dict[tuple[int, float], list[tuple[float, float, float]]] = {choice: [] for choice in choices}
     for frame in range(1, warm_up + steps + 1):
-        target = clearance.collider(setting.body[frame], sim.positions, sim.collider_vertices)
+        body = setting.body[frame]
         if frame > warm_up:
             exact = replace(solver, max_iterations=80, tolerance=1.0e-7, linear_tolerance=1.0e-3)
-            solved, _ = _try(sim, target, exact)
+            solved, _ = _try(sim, clearance, body, exact)
             for choice in choices:
                 few = replace(solver, max_iterations=choice[0], linear_tolerance=choice[1])
-                positions, seconds = _try(sim, target, few)
+                positions, seconds = _try(sim, clearance, body, few)
                 distance = 1e3 * np.linalg.norm(positions - solved, axis=1)
                 found[choice].append((distance.mean(), np.percentile(distance, 99.0), 1e3 * seconds))
-        sim.advance(target, DT)
+        advance_on_body(sim, clearance, body, DT)
     means = {choice: np.mean(rows, axis=0) for choice, rows in found.items()}
     return [StepFigures(*choice, *(float(value) for value in row)) for choice, row in means.items()]
 
 
 def _try(
-    sim: ClothSimulator, target: NDArray[np.float64], settings: SolverSettings
+    sim: ClothSimulator, clearance: SelfClearance, body: NDArray[np.float64], settings: SolverSettings
 ) -> tuple[NDArray[np.float64], float]:
     """Positions after a step and its CPU seconds; the simulator is left as it was."""
     x, velocity, usual = sim.x.numpy().copy(), sim.velocity, sim.settings
     bristle = sim.contact.friction.bristle.numpy().copy()
     sim.settings = settings
     begin = time.process_time()
-    sim.advance(target, DT)
+    advance_on_body(sim, clearance, body, DT)
     seconds = time.process_time() - begin
     positions = sim.positions
     sim.settings = usual

@@ -13,7 +13,8 @@ from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.clearance import SelfClearance, differs, room_for
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.layers import dress
-from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.solve.settings import SolverSettings, StepReport
+from muslin.sim.solve.simulator import ClothSimulator
 
 Tick = Callable[[], None] | None
 
@@ -32,6 +33,24 @@ def a_pose() -> NDArray[np.float64]:
         theta[collar, 2] = sign * np.radians(10.0)
         theta[shoulder, 2] = sign * np.radians(35.0)
     return theta
+
+
+def advance_on_body(
+    sim: ClothSimulator,
+    clearance: SelfClearance,
+    body: NDArray[np.float64],
+    dt: float,
+    *,
+    inertia: bool = True,
+) -> StepReport:
+    """One time step of `dt` seconds in which the collider goes where the `body` (N, 3) now stands.
+
+    Between parts of the body that cut into each other, where the collider is not the body anyway, it may go
+    elsewhere: where it would squeeze cloth, along with the other part.
+    """
+    target = clearance.collider(body, sim.positions, sim.collider_vertices)
+    sim.yielding = differs(body, target)
+    return sim.advance(target, dt, inertia=inertia)
 
 
 class WornGarment:
@@ -61,17 +80,6 @@ class WornGarment:
         """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""
         return self.model.vertices(self.beta, self.theta, self.translation)
 
-    def _advance(self, dt: float, inertia: bool) -> None:
-        """One time step in which the collider goes where the body now stands.
-
-        Between parts of the body that cut into each other, where the collider is not the body anyway, it may
-        go elsewhere: where it would squeeze cloth, along with the other part.
-        """
-        body = self.body()
-        target = self.clearance.collider(body, self.sim.positions, self.sim.collider_vertices)
-        self.sim.yielding = differs(body, target)
-        self.sim.advance(target, dt, inertia=inertia)
-
     def masked_faces(self) -> NDArray[np.int32]:
         """Faces on which the collider, as it stands, differs from the body."""
         return self.clearance.masked_faces(self.body(), self.sim.collider_vertices)
@@ -94,7 +102,7 @@ class WornGarment:
             share = k / steps
             self.beta = (1.0 - share) * begin[0] + share * beta if k < steps else beta
             self.theta = (1.0 - share) * begin[1] + share * theta if k < steps else theta
-            self._advance(MORPH_DT, inertia=False)
+            advance_on_body(self.sim, self.clearance, self.body(), MORPH_DT, inertia=False)
             if tick is not None:
                 tick()
 
@@ -103,7 +111,7 @@ class WornGarment:
         before = (self.theta, self.translation)
         self.theta, self.translation = theta, translation
         try:
-            self._advance(dt, inertia=True)
+            advance_on_body(self.sim, self.clearance, self.body(), dt)
         except Exception:
             self.theta, self.translation = before
             raise

@@ -43,6 +43,9 @@ SAME = 1.0e-8
 SURE = 1.0e-4
 """Metres, along a ray, within which a point counts as on a surface, not inside: rounding decides there."""
 
+PAST = wp.constant(wp.float32(1.0e-4))
+"""Metres by which a ray goes on past a surface that it has met: single precision would meet it again."""
+
 MAX_HITS = 12
 
 STEEPEST = 1.0
@@ -68,8 +71,7 @@ def free_distance(
         out[i] = reach
         return
     n = normals[i]
-    offset = float(1.0e-4)
-    origin = points[i] + n * offset
+    origin = points[i] + n * PAST
     # The signed crossings of a ray from a point to infinity are the winding number there.
     winding = float(0.0)
     first = reach
@@ -84,9 +86,9 @@ def free_distance(
             winding -= 1.0
             if winding < 0.0 and first == reach:
                 first = travelled + hit.t
-        travelled += hit.t + offset
+        travelled += hit.t + PAST
     if winding > 0.5:
-        back = wp.mesh_query_ray(mesh, points[i] - n * offset, -n, reach)
+        back = wp.mesh_query_ray(mesh, points[i] - n * PAST, -n, reach)
         # No other surface behind within reach: the count of crossings erred, or a limb passes right through.
         depth = -reach
         if back.result:
@@ -125,7 +127,7 @@ def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float
         if travelled == 0.0 and hit.t < SURE:
             return 0.0
         winding += wp.sign(wp.dot(hit.normal, direction))
-        travelled += hit.t + 1.0e-4
+        travelled += hit.t + PAST
     return winding
 
 
