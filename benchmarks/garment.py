@@ -43,6 +43,6 @@ def walk(setting: Setting) -> tuple[ClothSimulator, SelfClearance]:
     contact, solver = settings_of(load_scene(SCENE))
     cloth = cloth_model(setting)
     clearance = SelfClearance(setting.body[0], setting.body_faces, "cpu", room_for(cloth.rest_area))
-    collider = clearance.collider(setting.body[0], setting.positions)
+    collider = clearance.collider(setting.body[0], setting.positions).vertices
     sim = ClothSimulator(cloth, setting.positions, collider, setting.body_faces, contact, solver)
     return sim, clearance

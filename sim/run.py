@@ -153,10 +153,11 @@ def _drape(scene: Scene, mesh: GarmentMesh, worn: WornGarment, work: _Work, star
         worn.carry(worn.theta, np.array([0.0, float(worn.model.ground_offset(beta, pose)), 0.0]))
         work.finish(MORPH_WORK)
         rest = settle(worn.sim, scene.solver.settle_tolerance, scene.solver.settle_steps, tick=next_step)
+        state = _state(worn)
     except SimulationError as error:
         raise stopped(f"scene {scene.name}, drape", error, worn.sim) from error
     work.finish(scene.solver.settle_steps)
-    return _sample(scene, mesh, worn, [worn.sim.positions], [_state(worn)], rest, started)
+    return _sample(scene, mesh, worn, [worn.sim.positions], [state], rest, started)
 
 
 def _shared(scene: Scene) -> dict[str, object]:
@@ -207,13 +208,13 @@ def _sequence(
                 steps = scene.solver.settle_steps // 3
                 settle(worn.sim, scene.solver.settle_tolerance, steps, tick=next_step)
                 work.finish(MORPH_WORK)
+            if passed >= 0 and passed % substeps == 0:
+                positions.append(worn.sim.positions)
+                states.append(_state(worn))
+                work.tick()
         except SimulationError as error:
             where = "lead-in" if passed <= 0 else f"frame {passed // substeps}"
             raise stopped(f"scene {scene.name}, {where}", error, worn.sim) from error
-        if passed >= 0 and passed % substeps == 0:
-            positions.append(worn.sim.positions)
-            states.append(_state(worn))
-            work.tick()
     return _sample(scene, mesh, worn, positions, states, None, started, clip)
 
 

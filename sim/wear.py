@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.garments.mesh import GarmentMesh
+from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 from muslin.sim.body.model import BodyModel
 from muslin.sim.cloth import ClothModel
-from muslin.sim.contact.clearance import SelfClearance, differs, room_for
+from muslin.sim.contact.clearance import SelfClearance, room_for
 from muslin.sim.contact.system import ContactSettings
+from muslin.sim.dataset.intersections import crossed_body_faces
 from muslin.sim.layers import dress
+from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.settings import SolverSettings, StepReport
 from muslin.sim.solve.simulator import ClothSimulator
 
@@ -45,11 +48,10 @@ def advance_on_body(
 ) -> StepReport:
     """One time step of `dt` seconds in which the collider goes where the `body` (N, 3) now stands.
 
-    Between parts of the body that cut into each other, where the collider is not the body anyway, it may go
-    elsewhere: where it would squeeze cloth, along with the other part.
+    Where parts of the body cut into each other it may go elsewhere: where it would squeeze cloth, along with
+    the other part.
     """
-    target = clearance.collider(body, sim.positions, sim.collider_vertices)
-    sim.yielding = differs(body, target)
+    target, sim.yielding = clearance.collider(body, sim.positions, sim.collider_vertices)
     return sim.advance(target, dt, inertia=inertia)
 
 
@@ -77,12 +79,27 @@ class WornGarment:
         self.sim = dress(meshes, cloths, model, beta, contact, solver, device, tick)
 
     def body(self) -> NDArray[np.float64]:
-        """(N, 3) vertices of the body as it stands, metres; the collider differs from it in masked faces."""
+        """(N, 3) vertices of the body as it stands, metres."""
         return self.model.vertices(self.beta, self.theta, self.translation)
 
     def masked_faces(self) -> NDArray[np.int32]:
-        """Faces on which the collider, as it stands, differs from the body."""
-        return self.clearance.masked_faces(self.body(), self.sim.collider_vertices)
+        """Faces of the body that the cloth, rounded to single precision, crosses: between parts of it.
+
+        SimulationError if one is not there: the collider gave way more than it may.
+        """
+        body, faces = self.body(), self.model.faces
+        changed = self.clearance.changed_faces(body, self.sim.collider_vertices)
+        cloth = self.sim.positions.astype(np.float32)
+        crossed = changed[crossed_body_faces(cloth, self.sim.cloth.faces, body, faces[changed])]
+        outside = crossed[~masked_face_is_interior(body, faces, crossed, MASK_GAP_M)]
+        if len(outside):
+            place = ", ".join(f"{value:.3f}" for value in body[faces[outside[0]]].mean(axis=0))
+            raise SimulationError(
+                f"cloth crosses {len(outside)} faces of the body that are not between parts of it, the first "
+                f"at ({place}): parts of the body squeeze it; use a finer mesh, a looser garment or a slower "
+                "motion"
+            )
+        return crossed
 
     def carry(self, theta: NDArray[np.float64], translation: NDArray[np.float64]) -> None:
         """Move body and garment together, as one rigid piece, to another root rotation and translation."""

@@ -2,17 +2,17 @@
 
 Between two surfaces of a body that overlap, cloth has no place to be. The collider therefore differs from the
 body there, and only there: a vertex whose surroundings along its outward normal are taken by another part of
-the body within the gap g is drawn inwards, where cloth is near,
+the body within the gap g is drawn inwards, where cloth is near, by
 
-    s = (g - t) / 2 for 0 <= t < g,     s = g / 2 + depth for a vertex inside another part (t = -depth < 0),
+    s = (g - t) / 2,    t the free distance along the normal, or minus the depth inside another part,
 
-t the free distance along the normal, so that the two drawn-in surfaces leave g + depth between
-them. The displacement is continuous in t: when limbs part, the collider turns back into the body and the
-cloth between them comes out on the right side. In a crease the ray that measures the depth may run along the
-other part and meet it far away: s grows by no more than the way along the surface, `STEEPEST`, at which
-surfaces that cut each other at a right angle part. Faces of the body with a vertex so moved are the masked
-faces of the frame.
+so that the two drawn-in surfaces leave g between them. That is continuous in t: when limbs part, the collider
+turns back into the body and the cloth between them comes out on the right side. Where limbs bend, skin is
+folded and its normals point anywhere: s is made in parts of at most `STRIDE`, along the normals and by the
+free distances that the collider then has, with some smoothing in between.
 """
+
+from typing import NamedTuple
 
 import igl
 import numpy as np
@@ -21,7 +21,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from muslin.sim.body.interior import MASK_GAP_M
+from muslin.sim.body.interior import CREASE_M, GAP_SHARES, MASK_GAP_M
 
 wp.set_module_options({"enable_backward": False})
 
@@ -46,70 +46,22 @@ SURE = 1.0e-4
 PAST = wp.constant(wp.float32(1.0e-4))
 """Metres by which a ray goes on past a surface that it has met: single precision would meet it again."""
 
-MAX_HITS = 12
+MAX_HITS = 24
 
-STEEPEST = 1.0
-"""Most that the displacement may grow per metre along the surface."""
+STRIDE = 6.0e-3
+"""Metres by which a vertex is drawn inwards at a time."""
 
+AROUND = 0.01
+"""Metres within which positions are averaged: what is smaller than that folds no skin."""
 
-@wp.kernel
-def free_distance(
-    mesh: wp.uint64,
-    points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    near: wp.array(dtype=wp.int32),
-    gap: float,
-    reach: float,
-    out: wp.array(dtype=float),
-):
-    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside.
+RINGS = 4
+"""Edges away at most, for what is within `AROUND` but belongs to another limb."""
 
-    Those not `near` are not looked at: `reach`.
-    """
-    i = wp.tid()
-    if near[i] == 0:
-        out[i] = reach
-        return
-    n = normals[i]
-    origin = points[i] + n * PAST
-    # The signed crossings of a ray from a point to infinity are the winding number there.
-    winding = float(0.0)
-    first = reach
-    travelled = float(0.0)
-    for _ in range(MAX_HITS):
-        hit = wp.mesh_query_ray(mesh, origin + n * travelled, n, 10.0)
-        if not hit.result:
-            break
-        if wp.dot(hit.normal, n) > 0.0:
-            winding += 1.0
-        else:
-            winding -= 1.0
-            if winding < 0.0 and first == reach:
-                first = travelled + hit.t
-        travelled += hit.t + PAST
-    if winding > 0.5:
-        back = wp.mesh_query_ray(mesh, points[i] - n * PAST, -n, reach)
-        # No other surface behind within reach: the count of crossings erred, or a limb passes right through.
-        depth = -reach
-        if back.result:
-            depth = back.t
-        out[i] = -depth
-    else:
-        out[i] = wp.min(first, reach)
+SMOOTHING = 0.4
+"""Share of the way to the mean of its surroundings that a vertex goes after each stride."""
 
-
-def differs(vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which vertices (N,) of the collider are elsewhere than those of the body."""
-    moved = np.abs(vertices - collider) > SAME
-    return np.asarray(moved.any(axis=1))
-
-
-def room_for(rest_area: NDArray[np.float64]) -> float:
-    """The gap g, m, that cloth of triangles of such areas, m^2, needs: `ROOM` + L^2 / (8 `LIMB`).
-
-    The second term is the height of an arc of that radius over an edge of the mean length L.
-    """
-    return ROOM + 4.0 / np.sqrt(3.0) * float(rest_area.mean()) / (8.0 * LIMB)
+BESIDE = 0.9
+"""Share of `CREASE_M` within which vertices may give way: the verification's test is another one."""
 
 
 @wp.func
@@ -120,7 +72,7 @@ def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float
     """
     winding = float(0.0)
     travelled = float(0.0)
-    for _ in range(2 * MAX_HITS):
+    for _ in range(MAX_HITS):
         hit = wp.mesh_query_ray(mesh, origin + direction * travelled, direction, 10.0)
         if not hit.result:
             break
@@ -131,38 +83,92 @@ def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float
     return winding
 
 
+@wp.func
+def inside(mesh: wp.uint64, point: wp.vec3) -> bool:
+    """Whether a point is inside a closed surface, by two of three rays.
+
+    One may run along an edge, through two faces at once, or meet a surface that is close by.
+    """
+    first = winding_along(mesh, point, wp.normalize(wp.vec3(0.31, 0.83, 0.46))) > 0.5
+    second = winding_along(mesh, point, wp.normalize(wp.vec3(-0.71, -0.22, 0.67))) > 0.5
+    if first == second:
+        return first
+    return winding_along(mesh, point, wp.normalize(wp.vec3(0.52, -0.61, -0.60))) > 0.5
+
+
+@wp.kernel
+def free_distance(
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    near: wp.array(dtype=wp.int32),
+    offset: float,
+    reach: float,
+    out: wp.array(dtype=float),
+):
+    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside.
+
+    Whether it is inside is asked `offset` in front of it. Those not `near` are not looked at: `reach`.
+    """
+    i = wp.tid()
+    out[i] = reach
+    if near[i] == 0:
+        return
+    n = normals[i]
+    if inside(mesh, points[i] + n * offset):
+        # No other surface behind within reach: a limb passes right through.
+        behind = wp.mesh_query_ray(mesh, points[i] - n * PAST, -n, reach)
+        out[i] = -reach
+        if behind.result:
+            out[i] = -behind.t
+        return
+    front = wp.mesh_query_ray(mesh, points[i] + n * PAST, n, reach)
+    if front.result:
+        out[i] = front.t
+
+
 @wp.kernel
 def faces_with_body_in_front(
     mesh: wp.uint64,
     points: wp.array(dtype=wp.vec3),
     faces: wp.array2d(dtype=wp.int32),
     chosen: wp.array(dtype=wp.int32),
-    gap: float,
+    far: float,
+    close: float,
     found: wp.array(dtype=wp.int32),
 ):
-    """found = 1 where a corner or the centroid of a face, moved by `gap` along its normal, is inside.
-
-    By two opposite rays that must agree: one may run along an edge or through two faces at once, and one
-    meets a surface that is close by.
-    """
+    """found = 1 where a corner or the centroid of a face, `far` or `close` in front of it, is inside."""
     k = wp.tid()
     a = points[faces[chosen[k], 0]]
     b = points[faces[chosen[k], 1]]
     c = points[faces[chosen[k], 2]]
-    front = wp.normalize(wp.cross(b - a, c - a)) * gap
-    way = wp.normalize(wp.vec3(0.31, 0.83, 0.46))
-    for j in range(int(0), int(4)):
+    normal = wp.normalize(wp.cross(b - a, c - a))
+    for j in range(int(0), int(8)):
         p = (a + b + c) / 3.0
-        if j == 1:
+        if j % 4 == 1:
             p = a
-        elif j == 2:
+        elif j % 4 == 2:
             p = b
-        elif j == 3:
+        elif j % 4 == 3:
             p = c
-        p += front
-        if winding_along(mesh, p, way) > 0.5 and winding_along(mesh, p, -way) > 0.5:
+        if inside(mesh, p + normal * wp.where(j < 4, far, close)):
             found[k] = 1
             return
+
+
+def room_for(rest_area: NDArray[np.float64]) -> float:
+    """The gap g, m, that cloth of triangles of such areas, m^2, needs: `ROOM` + L^2 / (8 `LIMB`).
+
+    The second term is the height of an arc of that radius over an edge of the mean length L.
+    """
+    return ROOM + 4.0 / np.sqrt(3.0) * float(rest_area.mean()) / (8.0 * LIMB)
+
+
+class Collider(NamedTuple):
+    """Vertices (N, 3) of a collider, metres, and which of them, (N,), may give way to cloth."""
+
+    vertices: NDArray[np.float64]
+    yielding: NDArray[np.bool_]
 
 
 class SelfClearance:
@@ -183,74 +189,86 @@ class SelfClearance:
         self._free = wp.zeros(len(vertices), dtype=float, device=device)
         self._triangles = wp.array(faces, dtype=wp.int32, ndim=2, device=device)
         self._mesh = wp.Mesh(self._points, self._triangles.flatten())
-        self._edges = igl.edges(faces.astype(np.int64))
-        adjacency = igl.adjacency_matrix(faces.astype(np.int64)).astype(np.float64)
-        degree = scipy.sparse.diags_array(1.0 / np.asarray(adjacency.sum(axis=1)).ravel())
-        self._average = degree @ adjacency
+        self._average = _mean_within(vertices, faces.astype(np.int64), AROUND)
 
     def collider(
         self,
         vertices: NDArray[np.float64],
         cloth: NDArray[np.float64],
         standing: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """Vertices (N, 3) of the collider of a body in one pose, for a cloth (V, 3) near it, metres.
+    ) -> Collider:
+        """The collider of a body (N, 3) in one pose, for a cloth (V, 3) near it, metres.
 
-        A vertex moves only if there is cloth near it, and every face around it has the body in front. So the
-        faces on which collider and body differ may be masked:
-        `muslin.sim.body.interior.masked_face_is_interior`.
+        A vertex moves only if there is cloth near it, and every face around it has the body in front. It may
+        give way if it has moved, or if every face around it is at a crease: the faces on which collider and
+        body then differ may be masked, `muslin.sim.body.interior.masked_face_is_interior`.
         `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
         """
         beside = vertices if standing is None else standing
-        around = (beside > cloth.min(axis=0) - NEAR_CLOTH) & (beside < cloth.max(axis=0) + NEAR_CLOTH)
+        far = NEAR_CLOTH + REACH
+        around = (beside > cloth.min(axis=0) - far) & (beside < cloth.max(axis=0) + far)
         near = around.all(axis=1)
         normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
         free = self._free_distance(vertices, normals, near)
-        inwards = np.where(free < 0.0, 0.5 * self.room - free, 0.5 * np.maximum(self.room - free, 0.0))
-        self._flatten(inwards, vertices, near)
-        moved = inwards > 0.0
+        moved = free < self.room
         crowded = np.flatnonzero(moved)
-        distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=NEAR_CLOTH)
-        moved[crowded[~np.isfinite(distance)]] = False
+        distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=far)
+        # Deep inside, vertices must have moved before the cloth comes: they have far to go.
+        moved[crowded[distance > NEAR_CLOTH + np.maximum(-free[crowded], 0.0)]] = False
         faces = np.flatnonzero(moved[self.faces].any(axis=1))
-        if len(faces) == 0:
-            return vertices
         exposed = faces[~self._have_body_in_front(faces)]
         moved[self.faces[exposed].ravel()] = False
-        inwards = np.where(moved, inwards, 0.0)
-        for _ in range(3):
-            inwards = np.where(moved, np.maximum(inwards, self._average @ inwards), 0.0)
-        return vertices - inwards[:, None] * normals
+        yielding = moved | self._at_creases(vertices, np.flatnonzero(free < 0.0))
+        return Collider(self._drawn_in(vertices, normals, free, moved), yielding)
+
+    def _drawn_in(
+        self,
+        vertices: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        free: NDArray[np.float64],
+        moved: NDArray[np.bool_],
+    ) -> NDArray[np.float64]:
+        """`vertices` (N, 3), those `moved` (N,) drawn inwards until they leave room."""
+        rows = np.flatnonzero(moved)
+        if len(rows) == 0:
+            return vertices
+        x = vertices.copy()
+        average = self._average[rows]
+        strides = 2 + int(np.ceil(0.5 * (self.room - free[rows].min()) / STRIDE))
+        for stride in range(strides):
+            if stride > 0:
+                normals = igl.per_vertex_normals(x, self.faces.astype(np.int64))
+                free = self._free_distance(x, normals, moved)
+            inwards = np.clip(0.5 * (self.room - free[rows]), 0.0, STRIDE)
+            x[rows] -= inwards[:, None] * normals[rows]
+            x[rows] += SMOOTHING * (average @ x - x[rows])
+        return x
+
+    def _at_creases(self, vertices: NDArray[np.float64], inside: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Which vertices (N,) have only faces with a corner close to one of those `inside` the body."""
+        close = np.zeros(len(vertices), bool)
+        if len(inside) > 0:
+            tree = cKDTree(vertices[inside])
+            close = np.isfinite(tree.query(vertices, distance_upper_bound=BESIDE * CREASE_M)[0])
+        found = np.ones(len(vertices), bool)
+        found[self.faces[~close[self.faces].any(axis=1)].ravel()] = False
+        return found
 
     def _have_body_in_front(self, faces: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Whether each of `faces` (K,) has, of the body as it is in the mesh."""
         found = wp.zeros(len(faces), dtype=wp.int32, device=self.device)
         chosen = wp.array(faces, dtype=wp.int32, device=self.device)
-        args = [self._mesh.id, self._points, self._triangles, chosen, MASK_GAP_M, found]
+        gaps = [share * MASK_GAP_M for share in GAP_SHARES]
+        args = [self._mesh.id, self._points, self._triangles, chosen, *gaps, found]
         wp.launch(faces_with_body_in_front, len(faces), args, device=self.device)
         return found.numpy() > 0
 
-    def _flatten(
-        self, inwards: NDArray[np.float64], vertices: NDArray[np.float64], near: NDArray[np.bool_]
-    ) -> None:
-        """Lower `inwards` (N,) to the largest function below it that is nowhere steeper than `STEEPEST`.
-
-        Between vertices that are `near` (N,): of the others nothing is known.
-        """
-        edges = self._edges[(inwards[self._edges] > 0.0).any(axis=1) & near[self._edges].all(axis=1)]
-        rise = STEEPEST * np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-        here, there = np.concatenate([edges, edges[:, ::-1]]).T
-        rise = np.concatenate([rise, rise])
-        while True:
-            allowed = inwards[there] + rise
-            if (inwards[here] <= allowed + SAME).all():
-                return
-            np.minimum.at(inwards, here, allowed)
-
-    def masked_faces(self, vertices: NDArray[np.float64], collider: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Indices of the faces on which `collider` differs from the body."""
-        moved = differs(vertices, collider)
+    def changed_faces(
+        self, vertices: NDArray[np.float64], collider: NDArray[np.float64]
+    ) -> NDArray[np.int32]:
+        """Indices of the faces on which `collider` (N, 3) differs from the body."""
+        moved = (np.abs(vertices - collider) > SAME).any(axis=1)
         return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
 
     def _free_distance(
@@ -261,6 +279,27 @@ class SelfClearance:
         self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()
         self._near.assign(near.astype(np.int32))
-        args = [self._mesh.id, self._points, self._normals, self._near, self.room, REACH, self._free]
+        offset = GAP_SHARES[-1] * MASK_GAP_M
+        args = [self._mesh.id, self._points, self._normals, self._near, offset, REACH, self._free]
         wp.launch(free_distance, len(vertices), args, device=self.device)
         return self._free.numpy().astype(np.float64)
+
+
+def _mean_within(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], radius: float
+) -> scipy.sparse.csr_array:
+    """Mean (N, N), by area, over each vertex, its neighbours, and those within `radius` m and `RINGS`."""
+    own = np.arange(len(vertices))
+    edges = igl.edges(faces)
+    rows, columns = np.concatenate([edges, edges[:, ::-1], np.column_stack([own, own])]).T
+    ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(own), len(own)))
+    around = ring
+    for _ in range(RINGS - 1):
+        around = ring @ around
+    here, there = around.nonzero()
+    close = np.linalg.norm(vertices[here] - vertices[there], axis=1) < radius
+    rows, columns = np.concatenate([rows, here[close]]), np.concatenate([columns, there[close]])
+    area = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_BARYCENTRIC).diagonal()
+    weight = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=ring.shape)
+    weight = (weight > 0.0) @ scipy.sparse.diags_array(area)
+    return scipy.sparse.csr_array(scipy.sparse.diags_array(1.0 / weight.sum(axis=1)) @ weight)

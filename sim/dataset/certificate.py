@@ -21,7 +21,7 @@ class Certificate:
     cloth_body_intersections     pairs (edge, triangle), one of cloth and one of unmasked body, that cross
     min_distance_m               smallest distance of cloth to itself (not adjacent) or the collider, metres,
                                  as the solver saw it; only pairs within its contact range count
-    masked_body_faces_max        most faces of the body left out of contact in any frame
+    masked_body_faces_max        most faces of the body, between parts of it, that cloth crosses in any frame
     force_residual               largest norm of the residual force, as a share of the garment's weight
     largest_strain               largest principal stretch minus one, dimensionless
     """

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import ipctk
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -28,18 +29,48 @@ def count_intersections(
 
     Give the unmasked faces of the body only. Coordinates must be finite.
     """
+    scene = _scene(cloth_vertices, cloth_faces, body_vertices, body_faces)
+    pairs = _crossing_pairs(scene)
+    of_cloth = (scene.edges[pairs[:, 0], 0] < scene.num_cloth) & (pairs[:, 1] < len(cloth_faces))
+    return IntersectionCounts(int(of_cloth.sum()), int((~of_cloth).sum()))
+
+
+def crossed_body_faces(
+    cloth_vertices: np.ndarray, cloth_faces: np.ndarray, body_vertices: np.ndarray, body_faces: np.ndarray
+) -> NDArray[np.int32]:
+    """Which faces of the body the cloth crosses, rising; without them no pair of cloth and body is left."""
+    scene = _scene(cloth_vertices, cloth_faces, body_vertices, body_faces)
+    pairs = _crossing_pairs(scene)
+    crossed = np.zeros(len(scene.faces), dtype=bool)
+    crossed[pairs[:, 1]] = True
+    count = len(scene.vertices)
+    sides = np.sort(scene.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2) @ [count, 1]
+    crossed |= np.isin(sides, np.sort(scene.edges[pairs[:, 0]], axis=1) @ [count, 1]).any(axis=1)
+    return np.flatnonzero(scene.kept)[crossed[len(cloth_faces) :]].astype(np.int32)
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """Cloth, then body, as one mesh; of the body only the faces `kept` (M,), which the cloth might touch."""
+
+    vertices: np.ndarray
+    edges: np.ndarray
+    faces: np.ndarray
+    num_cloth: int
+    kept: np.ndarray
+
+
+def _scene(
+    cloth_vertices: np.ndarray, cloth_faces: np.ndarray, body_vertices: np.ndarray, body_faces: np.ndarray
+) -> _Scene:
     cloth = np.asarray(cloth_vertices, dtype=np.float64)
-    near = body_faces[_overlaps(body_vertices[body_faces], cloth.min(axis=0), cloth.max(axis=0))]
+    kept = _overlaps(body_vertices[body_faces], cloth.min(axis=0), cloth.max(axis=0))
+    near = body_faces[kept]
     used, local = np.unique(near, return_inverse=True)
     vertices = np.asfortranarray(np.concatenate([cloth, body_vertices[used]]))
     body = local.reshape(near.shape) + len(cloth)
     faces = np.asfortranarray(np.concatenate([cloth_faces, body]).astype(np.int32))
-    edges = np.asfortranarray(ipctk.edges(faces))
-    mesh = ipctk.CollisionMesh(vertices, edges, faces)
-    mesh.can_collide = ipctk.make_static_obstacle_filter(len(cloth))
-    if not ipctk.has_intersections(mesh, vertices, ipctk.LBVH()):
-        return IntersectionCounts(0, 0)
-    return _count_pairs(vertices, edges, faces, len(cloth))
+    return _Scene(vertices, np.asfortranarray(ipctk.edges(faces)), faces, len(cloth), kept)
 
 
 def _overlaps(triangles: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -48,25 +79,25 @@ def _overlaps(triangles: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.nd
     return np.logical_and((triangles.max(axis=1) >= low), (triangles.min(axis=1) <= high)).all(axis=1)
 
 
-def _count_pairs(
-    vertices: np.ndarray, edges: np.ndarray, faces: np.ndarray, n_cloth: int
-) -> IntersectionCounts:
+def _crossing_pairs(scene: _Scene) -> np.ndarray:
+    """Indices of edge and face (K, 2) of each pair that crosses."""
+    vertices, edges, faces = scene.vertices, scene.edges, scene.faces
+    mesh = ipctk.CollisionMesh(vertices, edges, faces)
+    mesh.can_collide = ipctk.make_static_obstacle_filter(scene.num_cloth)
+    if not ipctk.has_intersections(mesh, vertices, ipctk.LBVH()):
+        return np.zeros((0, 2), dtype=np.int64)
     broad_phase = ipctk.LBVH()
-    broad_phase.can_vertices_collide = ipctk.make_static_obstacle_filter(n_cloth)
+    broad_phase.can_vertices_collide = ipctk.make_static_obstacle_filter(scene.num_cloth)
     extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     # LBVH rounds boxes to float32; ipctk's own test inflates them by the same share.
     broad_phase.build(vertices, edges, faces, 1e-6 * extent)
     found = broad_phase.detect_edge_face_candidates()
     pairs = np.array([(pair.edge_id, pair.face_id) for pair in found], dtype=np.int64).reshape(-1, 2)
     pairs = pairs[_may_pierce(vertices, edges[pairs[:, 0]], faces[pairs[:, 1]])]
-    cloth_cloth = cloth_body = 0
-    for edge, face in zip(edges[pairs[:, 0]], faces[pairs[:, 1]], strict=True):
-        if ipctk.is_edge_intersecting_triangle(*vertices[edge], *vertices[face]):
-            if edge[0] < n_cloth and face[0] < n_cloth:
-                cloth_cloth += 1
-            else:
-                cloth_body += 1
-    return IntersectionCounts(cloth_cloth, cloth_body)
+    crossing = [
+        ipctk.is_edge_intersecting_triangle(*vertices[edges[e]], *vertices[faces[f]]) for e, f in pairs
+    ]
+    return pairs[np.array(crossing, dtype=bool)]
 
 
 def _may_pierce(vertices: np.ndarray, edges: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ class Sample:
     fps                 frames per second of a sequence, None for a drape
     obstacle_vertices   (T, N, 3), or (1, N, 3) if it stands still, float32, metres
     obstacle_faces      (M, 3) int32
-    masked_faces        a frame: int32 indices of the collider's faces left out of contact; () for none at all
+    masked_faces        a frame: int32 indices of body faces, between parts of it, that cloth crosses; or ()
     labels              what splits and tables go by: {"design": …, "shape": …, "sequence": …, "split": …}
     scene               the scene it was made from, as JSON values
     """

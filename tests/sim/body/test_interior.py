@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from muslin.garments.errors import InputError
 from muslin.sim.body import load_body
-from muslin.sim.body.interior import interior_points, masked_face_is_interior
+from muslin.sim.body.interior import CREASE_M, interior_points, masked_face_is_interior
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -73,6 +74,20 @@ def test_two_close_sheets_are_interior_only_within_the_gap() -> None:
     assert masked_face_is_interior(*both, facing, 0.005).all()
     assert not masked_face_is_interior(*both, facing, 0.003).any()
     assert not masked_face_is_interior(*both, others, 0.005).any()
+
+
+def test_faces_at_a_crease_are_interior_within_its_reach() -> None:
+    """Spheres that overlap by 3 mm, of triangles far smaller than `CREASE_M`."""
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
+    one, faces = np.array(ball.vertices), np.array(ball.faces)
+    vertices, both = joined((one, faces), (one + np.array([0.197, 0.0, 0.0]), faces))
+    passed = masked_face_is_interior(vertices, both, np.arange(len(faces)), 1e-3)
+    corners = one[faces]
+    axial, radial = corners[:, :, 0], np.linalg.norm(corners[:, :, 1:], axis=2)
+    inside = vertices[: len(one)][np.linalg.norm(one - [0.197, 0.0, 0.0], axis=1) < 0.0996]
+    near = cKDTree(inside).query(corners.reshape(-1, 3))[0].reshape(-1, 3).min(axis=1)
+    assert passed[near < 0.98 * CREASE_M].all()
+    assert not passed[(near > 1.05 * CREASE_M) & ((axial < 0.0) | (radial > 0.03)).all(axis=1)].any()
 
 
 def test_arm_through_the_trunk_is_found_on_the_body() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sheet_producer import RADIUS, RIPPLE, ball, make_sample, sheet, sheet_positions
 
-from muslin.sim.dataset.intersections import IntersectionCounts, count_intersections
+from muslin.sim.dataset.intersections import IntersectionCounts, count_intersections, crossed_body_faces
 
 GRID = 2.0**14
 """Coordinates are multiples of 1 / GRID, so that the determinants below are exact in 64-bit integers."""
@@ -69,6 +69,10 @@ def test_counts_equal_the_definition(seed: int, roughness: float) -> None:
     cloth, body = (np.rint(points * GRID) / GRID for points in (cloth, body))
     expected = slow_counts(cloth, garment.faces, body, body_faces)
     assert count_intersections(cloth, garment.faces, body, body_faces) == expected
+    alone = [slow_counts(cloth, garment.faces, body, body_faces[[face]]).cloth_body for face in range(8)]
+    crossed = crossed_body_faces(cloth, garment.faces, body, body_faces)
+    assert crossed.tolist() == np.flatnonzero(alone).tolist()
+    assert count_intersections(cloth, garment.faces, body, np.delete(body_faces, crossed, 0)).cloth_body == 0
 
 
 @pytest.mark.parametrize("clearance", [1e-4, 1e-6])
