@@ -21,7 +21,7 @@ from muslin.sim.solve.simulator import ClothSimulator
 
 Tick = Callable[[], None] | None
 
-MORPH_MOVE = 5.0e-3
+MORPH_MOVE = 0.03
 """Largest move of a body vertex, metres, in one step of a change of shape or pose at rest."""
 
 MORPH_DT = 1.0 / 30.0
