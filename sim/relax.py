@@ -31,10 +31,6 @@ STILL_STEPS = 2
 LINEAR_TOLERANCE = 0.01
 """Of the linear systems here: looser ones leave a drape creeping for twice the steps."""
 
-POLISH_ITERATIONS = 20
-POLISH_TOLERANCE = 1.0e-6
-"""The last step is solved this far, metres, so that the residual is not the solver's."""
-
 
 @dataclass(frozen=True)
 class RestReport:
@@ -61,7 +57,7 @@ def settle(
     sim.settings = replace(usual, linear_tolerance=min(usual.linear_tolerance, LINEAR_TOLERANCE))
     try:
         steps = _swing(sim, SWING * tolerance, max_steps // 2, tick)
-        dt, still = SWING_STEP, 0
+        dt, still, moved = SWING_STEP, 0, np.inf
         while steps < max_steps and still < STILL_STEPS:
             moved = measured_step(sim, dt, inertia=False)
             still = still + 1 if dt == LONGEST and moved < tolerance else 0
@@ -69,11 +65,9 @@ def settle(
             steps += 1
             if tick is not None:
                 tick()
-        sim.settings = replace(sim.settings, max_iterations=POLISH_ITERATIONS, tolerance=POLISH_TOLERANCE)
-        moved = measured_step(sim, LONGEST, inertia=False)
     finally:
         sim.settings = usual
-    return RestReport(steps + 1, moved, sim.force_residual(LONGEST), still >= STILL_STEPS)
+    return RestReport(steps, moved, sim.force_residual(LONGEST), still >= STILL_STEPS)
 
 
 def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable[[], None] | None) -> int:
