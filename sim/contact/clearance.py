@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import igl
 import numpy as np
+import scipy.ndimage
 import scipy.sparse
 import warp as wp
 from numpy.typing import NDArray
@@ -46,10 +47,19 @@ SURE = 1.0e-4
 PAST = wp.constant(wp.float32(1.0e-4))
 """Metres by which a ray goes on past a surface that it has met: single precision would meet it again."""
 
+FAR = wp.constant(wp.float32(10.0))
+"""Metres: nothing of a body is further away."""
+
 MAX_HITS = 24
 
 STRIDE = 6.0e-3
 """Metres by which a vertex is drawn inwards at a time."""
+
+LAST_STRIDE = 1.0e-3
+"""Metres: the stride in which no vertex goes further is the last."""
+
+TINY = 1.0e-300
+"""Where faces have no area, their vertices have no normal."""
 
 AROUND = 0.01
 """Metres within which positions are averaged: what is smaller than that folds no skin."""
@@ -73,7 +83,7 @@ def winding_along(mesh: wp.uint64, origin: wp.vec3, direction: wp.vec3) -> float
     winding = float(0.0)
     travelled = float(0.0)
     for _ in range(MAX_HITS):
-        hit = wp.mesh_query_ray(mesh, origin + direction * travelled, direction, 10.0)
+        hit = wp.mesh_query_ray(mesh, origin + direction * travelled, direction, FAR)
         if not hit.result:
             break
         if travelled == 0.0 and hit.t < SURE:
@@ -100,31 +110,32 @@ def inside(mesh: wp.uint64, point: wp.vec3) -> bool:
 def free_distance(
     mesh: wp.uint64,
     points: wp.array(dtype=wp.vec3),
+    rows: wp.array(dtype=wp.int32),
     normals: wp.array(dtype=wp.vec3),
-    near: wp.array(dtype=wp.int32),
     offset: float,
     reach: float,
     out: wp.array(dtype=float),
 ):
-    """t of each vertex: free distance along its normal, at most `reach`; minus its depth if inside.
+    """t of the vertices `rows`: free distance along their normals, at most `reach`, or minus their depth.
 
-    Whether it is inside is asked `offset` in front of it. Those not `near` are not looked at: `reach`.
+    Whether it is inside is asked `offset` in front of a vertex.
     """
-    i = wp.tid()
-    out[i] = reach
-    if near[i] == 0:
+    k = wp.tid()
+    point = points[rows[k]]
+    n = normals[k]
+    out[k] = reach
+    front = wp.mesh_query_ray(mesh, point + n * PAST, n, FAR)
+    if not front.result:
+        # From inside every ray meets the surface.
         return
-    n = normals[i]
-    if inside(mesh, points[i] + n * offset):
-        # No other surface behind within reach: a limb passes right through.
-        behind = wp.mesh_query_ray(mesh, points[i] - n * PAST, -n, reach)
-        out[i] = -reach
+    if inside(mesh, point + n * offset):
+        # No surface behind within reach: a small fold, or a limb that passes right through.
+        behind = wp.mesh_query_ray(mesh, point - n * PAST, -n, reach)
+        out[k] = -PAST
         if behind.result:
-            out[i] = -behind.t
-        return
-    front = wp.mesh_query_ray(mesh, points[i] + n * PAST, n, reach)
-    if front.result:
-        out[i] = front.t
+            out[k] = -behind.t
+    else:
+        out[k] = wp.min(front.t, reach)
 
 
 @wp.kernel
@@ -184,12 +195,13 @@ class SelfClearance:
         self.room = room
         self.device = device
         self._points = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device)
-        self._normals = wp.zeros(len(vertices), dtype=wp.vec3, device=device)
-        self._near = wp.zeros(len(vertices), dtype=wp.int32, device=device)
-        self._free = wp.zeros(len(vertices), dtype=float, device=device)
         self._triangles = wp.array(faces, dtype=wp.int32, ndim=2, device=device)
         self._mesh = wp.Mesh(self._points, self._triangles.flatten())
         self._average = _mean_within(vertices, faces.astype(np.int64), AROUND)
+        corners = (faces.ravel(), np.repeat(np.arange(len(faces)), 3))
+        self._faces_around = scipy.sparse.csr_array(
+            (np.ones(faces.size), corners), shape=(len(vertices), len(faces))
+        )
 
     def collider(
         self,
@@ -206,53 +218,51 @@ class SelfClearance:
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
         """
         beside = vertices if standing is None else standing
-        far = NEAR_CLOTH + REACH
-        around = (beside > cloth.min(axis=0) - far) & (beside < cloth.max(axis=0) + far)
-        near = around.all(axis=1)
-        normals = igl.per_vertex_normals(vertices, self.faces.astype(np.int64))
-        free = self._free_distance(vertices, normals, near)
+        far = NEAR_CLOTH + 0.5 * (self.room + REACH)
+        near = np.flatnonzero(_in_reach(beside, cloth, far))
+        free = np.full(len(vertices), REACH)
+        free[near] = self._free_distance(vertices, near, self._faces_around[near])
         moved = free < self.room
         crowded = np.flatnonzero(moved)
         distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=far)
-        # Deep inside, vertices must have moved before the cloth comes: they have far to go.
-        moved[crowded[distance > NEAR_CLOTH + np.maximum(-free[crowded], 0.0)]] = False
+        # Those with far to go must have gone before the cloth comes.
+        moved[crowded[distance > NEAR_CLOTH + 0.5 * (self.room - free[crowded])]] = False
         faces = np.flatnonzero(moved[self.faces].any(axis=1))
         exposed = faces[~self._have_body_in_front(faces)]
         moved[self.faces[exposed].ravel()] = False
         yielding = moved | self._at_creases(vertices, np.flatnonzero(free < 0.0))
-        return Collider(self._drawn_in(vertices, normals, free, moved), yielding)
+        return Collider(self._drawn_in(vertices, np.flatnonzero(moved), free[moved]), yielding)
 
     def _drawn_in(
-        self,
-        vertices: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        free: NDArray[np.float64],
-        moved: NDArray[np.bool_],
+        self, vertices: NDArray[np.float64], rows: NDArray[np.intp], free: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """`vertices` (N, 3), those `moved` (N,) drawn inwards until they leave room."""
-        rows = np.flatnonzero(moved)
+        """`vertices` (N, 3), those of `rows` (K,), with `free` (K,) before them, drawn in to leave room."""
         if len(rows) == 0:
             return vertices
         x = vertices.copy()
-        average = self._average[rows]
-        strides = 2 + int(np.ceil(0.5 * (self.room - free[rows].min()) / STRIDE))
-        for stride in range(strides):
-            if stride > 0:
-                normals = igl.per_vertex_normals(x, self.faces.astype(np.int64))
-                free = self._free_distance(x, normals, moved)
-            inwards = np.clip(0.5 * (self.room - free[rows]), 0.0, STRIDE)
-            x[rows] -= inwards[:, None] * normals[rows]
+        average, around = self._average[rows], self._faces_around[rows]
+        strides = 2 + int(np.ceil(0.5 * (self.room - free.min()) / STRIDE))
+        for _ in range(strides):
+            inwards = np.clip(0.5 * (self.room - free), 0.0, STRIDE)
+            x[rows] -= inwards[:, None] * self._normals(x, around)
             x[rows] += SMOOTHING * (average @ x - x[rows])
+            if inwards.max() < LAST_STRIDE:
+                break
+            free = self._free_distance(x, rows, around)
         return x
 
     def _at_creases(self, vertices: NDArray[np.float64], inside: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Which vertices (N,) have only faces with a corner close to one of those `inside` the body."""
-        close = np.zeros(len(vertices), bool)
-        if len(inside) > 0:
-            tree = cKDTree(vertices[inside])
-            close = np.isfinite(tree.query(vertices, distance_upper_bound=BESIDE * CREASE_M)[0])
-        found = np.ones(len(vertices), bool)
-        found[self.faces[~close[self.faces].any(axis=1)].ravel()] = False
+        found = np.zeros(len(vertices), bool)
+        if len(inside) == 0:
+            return found
+        far = BESIDE * CREASE_M
+        close = _in_reach(vertices, vertices[inside], far)
+        tree = cKDTree(vertices[inside])
+        close[close] = np.isfinite(tree.query(vertices[close], distance_upper_bound=far)[0])
+        apart = ~close[self.faces].any(axis=1)
+        found[:] = True
+        found[self.faces[apart].ravel()] = False
         return found
 
     def _have_body_in_front(self, faces: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -272,17 +282,44 @@ class SelfClearance:
         return np.flatnonzero(moved[self.faces].any(axis=1)).astype(np.int32)
 
     def _free_distance(
-        self, vertices: NDArray[np.float64], normals: NDArray[np.float64], near: NDArray[np.bool_]
+        self, vertices: NDArray[np.float64], rows: NDArray[np.intp], around: scipy.sparse.csr_array
     ) -> NDArray[np.float64]:
-        """t (N,) of the vertices `near` (N,), metres; `REACH` for the others."""
+        """t (K,) of `rows` (K,), which have the faces `around`, on a body (N, 3); metres."""
         self._points.assign(vertices.astype(np.float32))
-        self._normals.assign(normals.astype(np.float32))
         self._mesh.refit()
-        self._near.assign(near.astype(np.int32))
+        free = wp.zeros(len(rows), dtype=float, device=self.device)
+        chosen = wp.array(rows, dtype=wp.int32, device=self.device)
+        normals = wp.array(self._normals(vertices, around), dtype=wp.vec3, device=self.device)
         offset = GAP_SHARES[-1] * MASK_GAP_M
-        args = [self._mesh.id, self._points, self._normals, self._near, offset, REACH, self._free]
-        wp.launch(free_distance, len(vertices), args, device=self.device)
-        return self._free.numpy().astype(np.float64)
+        args = [self._mesh.id, self._points, chosen, normals, offset, REACH, free]
+        wp.launch(free_distance, len(rows), args, device=self.device)
+        return free.numpy().astype(np.float64)
+
+    def _normals(self, vertices: NDArray[np.float64], around: scipy.sparse.csr_array) -> NDArray[np.float64]:
+        """Normals (K, 3), by area, of the vertices that have the faces `around`, (K, M)."""
+        used, column = np.unique(around.indices, return_inverse=True)
+        a, b, c = vertices[self.faces[used]].swapaxes(0, 1)
+        near = scipy.sparse.csr_array(
+            (around.data, column, around.indptr), shape=(around.shape[0], len(used))
+        )
+        normals = near @ np.cross(b - a, c - a)
+        return normals / (np.linalg.norm(normals, axis=1, keepdims=True) + TINY)
+
+
+def _in_reach(points: NDArray[np.float64], cloth: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
+    """Which `points` (P, 3) are in a cell, of side `reach` / 3, at most three from one with `cloth` (V, 3).
+
+    All that are within `reach`, and some more.
+    """
+    low, side = cloth.min(axis=0), reach / 3.0
+    occupied = np.floor((cloth - low) / side).astype(np.int64) + 3
+    grid = np.zeros(occupied.max(axis=0) + 4, dtype=bool)
+    grid[tuple(occupied.T)] = True
+    grid = scipy.ndimage.maximum_filter(grid, 7)
+    cells = np.floor((points - low) / side).astype(np.int64) + 3
+    within = ((cells >= 0) & (cells < grid.shape)).all(axis=1)
+    within[within] = grid[tuple(cells[within].T)]
+    return within
 
 
 def _mean_within(

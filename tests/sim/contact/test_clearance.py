@@ -4,10 +4,11 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from muslin.sim.body import load_body
 from muslin.sim.body.interior import MASK_GAP_M, interior_points, masked_face_is_interior
-from muslin.sim.contact.clearance import LIMB, ROOM, SelfClearance, room_for
+from muslin.sim.contact.clearance import LIMB, ROOM, SelfClearance, _in_reach, room_for
 from muslin.sim.dataset.intersections import count_intersections
 
 RADIUS = 0.1
@@ -152,3 +153,11 @@ def test_coarse_cloth_has_the_height_of_an_arc_over_its_edges_more_room():
         left, right = collider[:n][middle[:n]], collider[n:][middle[n:]]
         gaps.append(right[:, 0].min() - left[:, 0].max())
     assert gaps[0] - gaps[1] == pytest.approx(room_for(triangles) - ROOM, rel=0.1)
+
+
+def test_no_point_in_reach_of_the_cloth_is_left_out():
+    points = np.random.default_rng(0).uniform(-0.4, 0.4, (4000, 3))
+    found = _in_reach(points, CLOTH, 0.07)
+    near = cKDTree(CLOTH).query(points)[0]
+    assert found[near < 0.07].all()
+    assert not found[near > 0.07 * (1.0 + 4.0 / 3.0) * np.sqrt(3.0)].any()
