@@ -28,7 +28,7 @@ SHOULDER_SEAM_DROP = 0.1225
 LEAST_GIRTH = 0.03
 """Share of its girth that the body has before it grows."""
 
-RELAX_STEPS, GROW_STEPS = 6, 12
+RELAX_STEPS, GROW_STEPS = 6, 24
 DRESS_DT = 1.0 / 30.0
 
 MAIN_CHILD = {0: 3, 1: 4, 2: 5, 3: 6, 4: 7, 5: 8, 6: 9, 7: 10, 8: 11, 9: 12, 12: 15, 13: 16, 14: 17}

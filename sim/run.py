@@ -36,7 +36,7 @@ __all__ = ["SimulationError", "compile_kernels", "cut_garment", "simulate", "sim
 
 Progress = Callable[[int, int], None]
 
-DRESS_WORK, MORPH_WORK = 18, 20
+DRESS_WORK, MORPH_WORK = 30, 20
 LEAD_IN_SECONDS = 1.0
 
 

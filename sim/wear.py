@@ -26,6 +26,9 @@ MORPH_MOVE = 0.03
 
 MORPH_DT = 1.0 / 30.0
 
+ATTEMPTS = (1.0, 2.0, 0.5)
+"""Shares of the room between parts of a body: where one leaves no way for the cloth, another may."""
+
 REST_POSE = np.zeros((24, 3))
 
 
@@ -49,10 +52,22 @@ def advance_on_body(
     """One time step of `dt` seconds in which the collider goes where the `body` (N, 3) now stands.
 
     Where parts of the body cut into each other it may go elsewhere: where it would squeeze cloth, along with
-    the other part.
+    the other part. If there is no way for the cloth, more and less room is tried: SimulationError, that of
+    the first attempt, if that does not help.
     """
-    target, sim.yielding = clearance.collider(body, sim.positions, sim.collider_vertices)
-    return sim.advance(target, dt, inertia=inertia)
+    stopped: SimulationError | None = None
+    tried: NDArray[np.float64] | None = None
+    for share in ATTEMPTS:
+        target, sim.yielding = clearance.collider(body, sim.positions, sim.collider_vertices, share)
+        if tried is not None and np.array_equal(target, tried):
+            continue
+        tried = target
+        try:
+            return sim.advance(target, dt, inertia=inertia)
+        except SimulationError as error:
+            stopped = stopped or error
+    assert stopped is not None
+    raise stopped
 
 
 class WornGarment:

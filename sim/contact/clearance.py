@@ -208,6 +208,7 @@ class SelfClearance:
         vertices: NDArray[np.float64],
         cloth: NDArray[np.float64],
         standing: NDArray[np.float64] | None = None,
+        share: float = 1.0,
     ) -> Collider:
         """The collider of a body (N, 3) in one pose, for a cloth (V, 3) near it, metres.
 
@@ -216,34 +217,36 @@ class SelfClearance:
         body then differ may be masked, `muslin.sim.body.interior.masked_face_is_interior`.
         `standing` (N, 3): where the vertices are while the cloth is at `cloth`, if not at `vertices`; a body
         that moves faster than `NEAR_CLOTH` a step would otherwise be out of reach of its own clothes.
+        `share` of the room is left.
         """
+        room = share * self.room
         beside = vertices if standing is None else standing
-        far = NEAR_CLOTH + 0.5 * (self.room + REACH)
+        far = NEAR_CLOTH + 0.5 * (room + REACH)
         near = np.flatnonzero(_in_reach(beside, cloth, far))
         free = np.full(len(vertices), REACH)
         free[near] = self._free_distance(vertices, near, self._faces_around[near])
-        moved = free < self.room
+        moved = free < room
         crowded = np.flatnonzero(moved)
         distance, _ = cKDTree(cloth).query(beside[crowded], distance_upper_bound=far)
         # Those with far to go must have gone before the cloth comes.
-        moved[crowded[distance > NEAR_CLOTH + 0.5 * (self.room - free[crowded])]] = False
+        moved[crowded[distance > NEAR_CLOTH + 0.5 * (room - free[crowded])]] = False
         faces = np.flatnonzero(moved[self.faces].any(axis=1))
         exposed = faces[~self._have_body_in_front(faces)]
         moved[self.faces[exposed].ravel()] = False
         yielding = moved | self._at_creases(vertices, np.flatnonzero(free < 0.0))
-        return Collider(self._drawn_in(vertices, np.flatnonzero(moved), free[moved]), yielding)
+        return Collider(self._drawn_in(vertices, np.flatnonzero(moved), free[moved], room), yielding)
 
     def _drawn_in(
-        self, vertices: NDArray[np.float64], rows: NDArray[np.intp], free: NDArray[np.float64]
+        self, vertices: NDArray[np.float64], rows: NDArray[np.intp], free: NDArray[np.float64], room: float
     ) -> NDArray[np.float64]:
-        """`vertices` (N, 3), those of `rows` (K,), with `free` (K,) before them, drawn in to leave room."""
+        """`vertices` (N, 3), those of `rows` (K,), with `free` (K,) before them, drawn in to leave `room`."""
         if len(rows) == 0:
             return vertices
         x = vertices.copy()
         average, around = self._average[rows], self._faces_around[rows]
-        strides = 2 + int(np.ceil(0.5 * (self.room - free.min()) / STRIDE))
+        strides = 2 + int(np.ceil(0.5 * (room - free.min()) / STRIDE))
         for _ in range(strides):
-            inwards = np.clip(0.5 * (self.room - free), 0.0, STRIDE)
+            inwards = np.clip(0.5 * (room - free), 0.0, STRIDE)
             x[rows] -= inwards[:, None] * self._normals(x, around)
             x[rows] += SMOOTHING * (average @ x - x[rows])
             if inwards.max() < LAST_STRIDE:

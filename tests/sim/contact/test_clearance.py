@@ -155,6 +155,17 @@ def test_coarse_cloth_has_the_height_of_an_arc_over_its_edges_more_room():
     assert gaps[0] - gaps[1] == pytest.approx(room_for(triangles) - ROOM, rel=0.1)
 
 
+def test_a_share_of_the_room_is_left():
+    vertices, faces = two_spheres(-0.01)
+    clearance = SelfClearance(vertices, faces, "cpu")
+    left = [
+        room_between(clearance.collider(vertices, CLOTH, share=share).vertices, faces)
+        for share in (0.5, 1.0, 2.0)
+    ]
+    assert left[1] > 1.3 * left[0]
+    assert left[2] > 1.3 * left[1]
+
+
 def test_no_point_in_reach_of_the_cloth_is_left_out():
     points = np.random.default_rng(0).uniform(-0.4, 0.4, (4000, 3))
     found = _in_reach(points, CLOTH, 0.07)
