@@ -156,6 +156,7 @@ def test_coarse_cloth_has_the_height_of_an_arc_over_its_edges_more_room():
 
 
 def test_a_share_of_the_room_is_left():
+    """Twice the room only as far as faces have the body in front of them."""
     vertices, faces = two_spheres(-0.01)
     clearance = SelfClearance(vertices, faces, "cpu")
     left = [
@@ -163,7 +164,7 @@ def test_a_share_of_the_room_is_left():
         for share in (0.5, 1.0, 2.0)
     ]
     assert left[1] > 1.3 * left[0]
-    assert left[2] > 1.3 * left[1]
+    assert left[2] > 1.15 * left[1]
 
 
 def test_no_point_in_reach_of_the_cloth_is_left_out():
