@@ -104,6 +104,8 @@ class WornGarment:
         """
         body, faces = self.body(), self.model.faces
         changed = self.clearance.changed_faces(body, self.sim.collider_vertices)
+        if len(changed) == 0:
+            return changed
         cloth = self.sim.positions.astype(np.float32)
         crossed = changed[crossed_body_faces(cloth, self.sim.cloth.faces, body, faces[changed])]
         outside = crossed[~masked_face_is_interior(body, faces, crossed, MASK_GAP_M)]

@@ -256,16 +256,12 @@ class SelfClearance:
 
     def _at_creases(self, vertices: NDArray[np.float64], inside: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Which vertices (N,) have only faces with a corner close to one of those `inside` the body."""
-        found = np.zeros(len(vertices), bool)
         if len(inside) == 0:
-            return found
-        far = BESIDE * CREASE_M
-        close = _in_reach(vertices, vertices[inside], far)
-        tree = cKDTree(vertices[inside])
-        close[close] = np.isfinite(tree.query(vertices[close], distance_upper_bound=far)[0])
-        apart = ~close[self.faces].any(axis=1)
-        found[:] = True
-        found[self.faces[apart].ravel()] = False
+            return np.zeros(len(vertices), bool)
+        distance, _ = cKDTree(vertices[inside]).query(vertices, distance_upper_bound=BESIDE * CREASE_M)
+        close = np.isfinite(distance)
+        found = np.ones(len(vertices), bool)
+        found[self.faces[~close[self.faces].any(axis=1)].ravel()] = False
         return found
 
     def _have_body_in_front(self, faces: NDArray[np.intp]) -> NDArray[np.bool_]:
