@@ -33,10 +33,10 @@ LIMB = 0.03
 """Radius of a thin limb, metres: cloth is straight along edges, and needs more room the longer they are."""
 
 REACH = 0.08
-"""Metres: overlaps deeper than this are no soft contact but limbs that pass through the body."""
+"""Metres along the normal: free distances, and depths, beyond this are not told apart."""
 
 NEAR_CLOTH = 0.03
-"""Metres: where no cloth is this near, the collider is the body."""
+"""Metres: where no cloth is this near, and no vertex has further to go, the collider is the body."""
 
 SAME = 1.0e-8
 """Metres below which collider and body do not differ: the rounding of a move that is made in parts."""
