@@ -8,7 +8,6 @@ from importlib.metadata import version
 
 import numpy as np
 
-from muslin.sim.cloth import ClothModel
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dataset.sample import Sample
@@ -17,20 +16,20 @@ from muslin.sim.relax import RestReport
 from muslin.sim.scene import Scene
 
 
-def certify(sample: Sample, cloth: ClothModel, base: Certificate) -> Sample:
+def certify(sample: Sample, base: Certificate) -> Sample:
     """`sample` with `base` completed by intersections (ipctk), masked faces and strain of every frame."""
     cloth_cloth = cloth_body = 0
     stretch = 0.0
     for frame in range(sample.num_frames):
-        positions = sample.positions[frame].astype(np.float64)
+        garment, positions = sample.frame_garment(frame), sample.frame_positions(frame).astype(np.float64)
         live = np.ones(len(sample.body_faces), bool)
         live[sample.masked(frame)] = False
         counts = count_intersections(
-            positions, sample.garment.faces, sample.body_vertices(frame), sample.body_faces[live]
+            positions, garment.faces, sample.body_vertices(frame), sample.body_faces[live]
         )
         cloth_cloth += counts.cloth_cloth
         cloth_body += counts.cloth_body
-        stretch = max(stretch, float(principal_stretches(cloth, positions)[:, 0].max()))
+        stretch = max(stretch, float(principal_stretches(garment, positions)[:, 0].max()))
     masked = max((len(faces) for faces in sample.masked_faces), default=0)
     return replace(
         sample,

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from muslin.garments.mesh import GarmentMesh
 from muslin.sim.cloth import ClothModel
 from muslin.sim.energies.bending import (
     BendModel,
@@ -113,8 +114,11 @@ def _ascending(cloth: ClothModel) -> tuple[NDArray[np.int32], NDArray[np.float64
     return faces, np.take_along_axis(shape_gradients, order[:, :, None], axis=1)[:, 1:]
 
 
-def principal_stretches(cloth: ClothModel, positions: np.ndarray) -> np.ndarray:
-    """Principal stretches (F, 2), larger first: singular values of the deformation gradient."""
-    corners = positions[cloth.faces]
-    edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-    return np.linalg.svd(edges @ cloth.inverse_rest, compute_uv=False)
+def principal_stretches(mesh: GarmentMesh, positions: np.ndarray) -> np.ndarray:
+    """Principal stretches (F, 2), larger first: singular values of the deformation gradient dx/du, u in panel
+    space. positions (V, 3), metres."""
+    world, rest = (
+        np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        for corners in (positions[mesh.faces], mesh.panel_vertices[mesh.panel_faces])
+    )
+    return np.linalg.svd(world @ np.linalg.inv(rest), compute_uv=False)

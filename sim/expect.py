@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.scene import ExpectTable, Scene
 
@@ -48,7 +50,7 @@ def _at_most(key: str, measured: float | None, allowed: float | None) -> list[st
 
 
 def _points(wanted: ExpectTable, sample: Sample) -> list[str]:
-    heights = sample.positions[..., 1]
+    heights = np.concatenate([sample.frame_positions(frame)[:, 1] for frame in range(sample.num_frames)])
     violations = []
     for key, measured, allowed in (
         ("lowest_point", float(heights.min()), wanted.lowest_point),

@@ -258,4 +258,4 @@ def _sample(
         labels={"sequence": clip.name, "motion_source": clip.source} if clip is not None else {},
     )
     distance = min(state[3] for state in states)
-    return certify(sample, worn.sim.cloth, solved(scene, distance, rest, started, len(positions)))
+    return certify(sample, solved(scene, distance, rest, started, len(positions)))

@@ -53,7 +53,7 @@ def simulate(
     found = sample.certificate
     typer.echo(
         f"{out}: {sample.kind} {sample.id}, {sample.num_frames} frames, "
-        f"{sample.garment.num_vertices} vertices, "
+        f"{sample.num_vertices} vertices, "
         f"{found.cloth_cloth_intersections} cloth-cloth and {found.cloth_body_intersections} cloth-body "
         f"intersections, {found.seconds:.1f} s"
     )

@@ -12,7 +12,7 @@ from trimesh.visual import TextureVisuals
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
-from muslin.sim.dataset.parts import Part, sample_parts
+from muslin.sim.dataset.parts import MovingPart, Part, RemeshedPart, sample_parts
 from muslin.sim.dataset.pc2 import write_pc2
 from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.usd import write_usd
@@ -47,15 +47,18 @@ def export_dataset(
 
 
 def export_parts(
-    name: str, parts: Sequence[Part], fps: float | None, out: str | Path, file_format: str
+    name: str, parts: Sequence[MovingPart], fps: float | None, out: str | Path, file_format: str
 ) -> list[Path]:
-    """Write parts that move together.
+    """Write parts that move together; of a part whose topology changes every frame has its own.
 
     obj, ply   NAME_PART.obj, or NAME/PART_0000.obj … of a sequence; OBJ carries uv
     glb        NAME.glb, or NAME/0000.glb …, all parts in one file
     usd        NAME.usd, positions over time
-    pc2        NAME_PART.pc2 with the first frame as NAME_PART.obj
-    npz        NAME.npz: PART_positions, PART_faces, PART_uv, PART_uv_faces, fps
+    pc2        NAME_PART.pc2 with the first frame as NAME_PART.obj; fixed topology only
+    npz        NAME.npz: PART_positions, PART_faces, PART_uv, PART_uv_faces, fps; where the topology changes,
+               PART_positions_0000 … a frame, PART_topology (T,) and PART_faces_0 … a topology, so with uv
+
+    Raises InputError for a format that cannot hold what is asked for, and if a file would be overwritten.
     """
     if file_format not in FORMATS:
         raise InputError(f"format {file_format!r}: must be one of {', '.join(FORMATS)}")
@@ -75,10 +78,10 @@ def export_parts(
     return list(files)
 
 
-def write_obj(path: Path, part: Part, frame: int = 0) -> None:
-    """Write one frame as OBJ: sewn vertices, faces with uv corners. Nine digits keep float32 exactly."""
+def write_obj(path: Path, part: Part) -> None:
+    """Write the first frame as OBJ: sewn vertices, faces with uv corners. Nine digits keep float32."""
     lines = [f"o {part.name}"]
-    lines += ["v {:.9g} {:.9g} {:.9g}".format(*xyz) for xyz in part.positions[frame].tolist()]
+    lines += ["v {:.9g} {:.9g} {:.9g}".format(*xyz) for xyz in part.positions[0].tolist()]
     if part.uv is not None and part.uv_faces is not None:
         lines += ["vt {:.9g} {:.9g}".format(*uv) for uv in part.uv.tolist()]
         corners = np.stack([part.faces, part.uv_faces], axis=2) + 1
@@ -88,8 +91,8 @@ def write_obj(path: Path, part: Part, frame: int = 0) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def _files(name: str, parts: Sequence[Part], fps: float | None, file_format: str) -> dict[str, Writer]:
-    frames = max(len(part.positions) for part in parts)
+def _files(name: str, parts: Sequence[MovingPart], fps: float | None, file_format: str) -> dict[str, Writer]:
+    frames = max(part.num_frames for part in parts)
     match file_format:
         case "usd":
             return {f"{name}.usd": lambda path: write_usd(path, parts, fps)}
@@ -99,44 +102,51 @@ def _files(name: str, parts: Sequence[Part], fps: float | None, file_format: str
             names = [f"{name}.glb"] if frames == 1 else [f"{name}/{k:04d}.glb" for k in range(frames)]
             return {file: _glb_writer(parts, k) for k, file in enumerate(names)}
         case "pc2":
-            caches = {f"{name}_{part.name}.pc2": _pc2_writer(part) for part in parts}
+            caches = {f"{name}_{part.name}.pc2": _pc2_writer(name, part) for part in parts}
             return caches | {f"{name}_{part.name}.obj": _mesh_writer(part, 0, "obj") for part in parts}
     files: dict[str, Writer] = {}
     for part in parts:
-        for k in range(len(part.positions)):
+        for k in range(part.num_frames):
             still = f"{name}_{part.name}.{file_format}"
             file = still if frames == 1 else f"{name}/{part.name}_{k:04d}.{file_format}"
             files[file] = _mesh_writer(part, k, file_format)
     return files
 
 
-def _pc2_writer(part: Part) -> Writer:
-    return lambda path: write_pc2(path, part.positions)
+def _pc2_writer(name: str, part: MovingPart) -> Writer:
+    if isinstance(part, RemeshedPart):
+        raise InputError(
+            f"format pc2: the topology of {name}'s {part.name} changes over time, and a point cache has "
+            "but one; export it as usd, or frame by frame as obj, ply or glb"
+        )
+    positions = part.positions
+    return lambda path: write_pc2(path, positions)
 
 
-def _mesh_writer(part: Part, frame: int, file_format: str) -> Writer:
+def _mesh_writer(part: MovingPart, frame: int, file_format: str) -> Writer:
     if file_format == "obj":
-        return lambda path: write_obj(path, part, frame)
+        return lambda path: write_obj(path, part.at(frame))
 
     def write_ply(path: Path) -> None:
-        mesh = trimesh.Trimesh(part.positions[frame], part.faces, process=False)
+        now = part.at(frame)
+        mesh = trimesh.Trimesh(now.positions[0], now.faces, process=False)
         mesh.export(path, file_type="ply", vertex_normal=False)
 
     return write_ply
 
 
-def _glb_writer(parts: Sequence[Part], frame: int) -> Writer:
+def _glb_writer(parts: Sequence[MovingPart], frame: int) -> Writer:
     def write(path: Path) -> None:
         scene = trimesh.Scene()
         for part in parts:
-            scene.add_geometry(_textured(part, frame), node_name=part.name, geom_name=part.name)
+            scene.add_geometry(_textured(part.at(frame)), node_name=part.name, geom_name=part.name)
         path.write_bytes(scene.export(file_type="glb"))
 
     return write
 
 
-def _textured(part: Part, frame: int) -> trimesh.Trimesh:
-    positions = part.positions[min(frame, len(part.positions) - 1)]
+def _textured(part: Part) -> trimesh.Trimesh:
+    positions = part.positions[0]
     sewn = trimesh.Trimesh(positions, part.faces, process=False)
     if part.uv is None or part.uv_faces is None:
         return sewn
@@ -151,11 +161,22 @@ def _textured(part: Part, frame: int) -> trimesh.Trimesh:
     )
 
 
-def _write_npz(path: Path, parts: Sequence[Part], fps: float | None) -> None:
+def _write_npz(path: Path, parts: Sequence[MovingPart], fps: float | None) -> None:
     arrays: dict[str, np.ndarray] = {"fps": np.array(fps or 0.0)}
     for part in parts:
-        arrays |= {f"{part.name}_positions": part.positions, f"{part.name}_faces": part.faces}
-        if part.uv is not None and part.uv_faces is not None:
-            arrays |= {f"{part.name}_uv": part.uv, f"{part.name}_uv_faces": part.uv_faces}
+        if isinstance(part, Part):
+            arrays |= {f"{part.name}_positions": part.positions, **_topology_arrays(part)}
+            continue
+        arrays[f"{part.name}_topology"] = part.frame_topology
+        arrays |= {f"{part.name}_positions_{k:04d}": frame for k, frame in enumerate(part.frames)}
+        for k, topology in enumerate(part.topologies):
+            arrays |= {f"{key}_{k}": array for key, array in _topology_arrays(topology).items()}
     with path.open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def _topology_arrays(part: Part) -> dict[str, np.ndarray]:
+    arrays = {f"{part.name}_faces": part.faces}
+    if part.uv is not None and part.uv_faces is not None:
+        arrays |= {f"{part.name}_uv": part.uv, f"{part.name}_uv_faces": part.uv_faces}
+    return arrays

@@ -42,6 +42,9 @@ COLUMNS = pa.schema(
     ]
 )
 
+TOPOLOGIES = pa.field("topologies", pa.int64())
+"""A column that only the index of a dataset with a remeshed sequence has: distinct meshes of each sample."""
+
 _FROM_CERTIFICATE = (
     "cloth_cloth_intersections",
     "cloth_body_intersections",
@@ -70,6 +73,7 @@ def row(root: Path, header: Header, sample_id: str) -> dict[str, Any]:
         "frames": meta["frames"],
         "fps": meta["fps"],
         "vertices": meta["vertices"],
+        "topologies": meta.get("topologies", 1),
         "seed": meta["seed"],
         "bytes": store.stored_bytes(root, sample_id),
         "geometry_sha256": store.geometry_digest(checksums),
@@ -80,7 +84,9 @@ def row(root: Path, header: Header, sample_id: str) -> dict[str, Any]:
 def write_index(root: Path, header: Header) -> None:
     """Write the rows of all samples that are there, in plan order, replacing the index in one step."""
     ids = in_plan_order(header, store.stored_ids(root))
-    table = pa.Table.from_pylist([row(root, header, sample_id) for sample_id in ids], schema=COLUMNS)
+    rows = [row(root, header, sample_id) for sample_id in ids]
+    remeshed = any(entry["topologies"] > 1 for entry in rows)
+    table = pa.Table.from_pylist(rows, schema=COLUMNS.append(TOPOLOGIES) if remeshed else COLUMNS)
     sink = io.BytesIO()
     pq.write_table(table, sink)
     durable.write_file(root / INDEX, sink.getvalue())
@@ -111,9 +117,9 @@ def _stored_rows(root: Path) -> list[dict[str, Any]]:
         table = pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
         raise InputError(f"{path}: not readable ({error}); {_REBUILD}") from error
-    if table.schema.names != COLUMNS.names:
+    if table.schema.names not in (COLUMNS.names, COLUMNS.append(TOPOLOGIES).names):
         raise InputError(f"{path}: columns are not those of an index; {_REBUILD}")
-    return table.to_pylist()
+    return [{TOPOLOGIES.name: 1} | entry for entry in table.to_pylist()]
 
 
 _REBUILD = "delete it, it is rebuilt from the samples"

@@ -17,7 +17,9 @@ class DatasetInfo:
     """What a dataset holds.
 
     designs, shapes, sequences, fabrics, splits   {name: number of samples}
-    vertices                                      (fewest, most) cloth vertices of a sample
+    remeshed                                      sequences whose topology changes
+    vertices                                      (fewest, most) cloth vertices of a sample, in the frame that
+                                                  has the most
     bytes                                         size of all samples on disk
     certificates                                  {figure: worst over all samples that measured it}
     unmeasured                                    {figure: samples whose certificate lacks it}
@@ -31,6 +33,7 @@ class DatasetInfo:
     missing: int
     drapes: int
     sequences_made: int
+    remeshed: int
     frames: int
     designs: dict[str, int]
     shapes: dict[str, int]
@@ -74,6 +77,7 @@ def info(path: str | Path) -> DatasetInfo:
         missing=len(dataset.missing),
         drapes=kinds["drape"],
         sequences_made=kinds["sequence"],
+        remeshed=sum(row["topologies"] > 1 for row in rows),
         frames=sum(row["frames"] for row in rows),
         designs=_count(row["design"] for row in rows),
         shapes=_count(row["shape"] for row in rows),

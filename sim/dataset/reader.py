@@ -21,7 +21,7 @@ from muslin.sim.dataset.schema import LOCK
 class Dataset:
     """Samples of a dataset, each read from disk when asked for.
 
-    rows   one dict a sample, the columns of `index.COLUMNS`, in plan order
+    rows   one dict a sample, the columns of `index.COLUMNS` and `topologies`, in plan order
     """
 
     root: Path

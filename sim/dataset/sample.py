@@ -40,6 +40,9 @@ class BodyTrack:
 class Sample:
     """One garment on one body: a drape (T = 1) or a sequence of T frames.
 
+    What works for a sequence whose mesh is replaced between frames too (`RemeshedSequence`) reads the cloth
+    through `frame_garment` and `frame_positions` instead of `garment` and `positions`.
+
     What the cloth lies on is either `body` or, for other colliders (a sphere, a scan), `obstacle_vertices`
     with `obstacle_faces`; with neither, the cloth is alone.
 
@@ -71,6 +74,24 @@ class Sample:
     @property
     def num_frames(self) -> int:
         return len(self.positions)
+
+    @property
+    def garments(self) -> tuple[GarmentMesh, ...]:
+        """The distinct meshes of the garment: one, but in a `RemeshedSequence`."""
+        return (self.garment,)
+
+    def frame_garment(self, frame: int) -> GarmentMesh:
+        """The mesh of the garment in a frame; the same object in every frame of one topology."""
+        return self.garment
+
+    def frame_positions(self, frame: int) -> np.ndarray:
+        """(V_t, 3) float32 positions of the vertices of `frame_garment(frame)`, metres."""
+        return self.positions[frame]
+
+    @property
+    def num_vertices(self) -> int:
+        """Cloth vertices; the most of any frame where the topology changes."""
+        return max(garment.num_vertices for garment in self.garments)
 
     @property
     def times(self) -> np.ndarray:
@@ -108,7 +129,7 @@ class Sample:
 
     def validate(self) -> Sample:
         """Raise InputError naming the first array whose shape, type or values cannot be; return self."""
-        T, V = self.num_frames, self.garment.num_vertices
+        T = self.num_frames
         named = bool(self.id) and all(c.isascii() and (c.isalnum() or c in "-_") for c in self.id)
         self._require(named, f"id {self.id!r}", "of letters, digits, - and _")
         self._require(self.kind in ("drape", "sequence"), f"kind {self.kind!r}", "'drape' or 'sequence'")
@@ -116,7 +137,7 @@ class Sample:
         if self.kind == "sequence":
             positive = self.fps is not None and 0 < self.fps < np.inf
             self._require(positive, f"fps = {self.fps}", "a positive number in a sequence")
-        self._array("positions", self.positions, (T, V, 3), np.float32)
+        self._validate_cloth()
         if self.body is not None:
             self._require(self.obstacle_vertices is None, "obstacle_vertices beside body", "one of the two")
             self._array("body.beta", self.body.beta, (None,), np.float64)
@@ -128,6 +149,10 @@ class Sample:
         for indices in self.masked_faces:
             self._array("masked_faces", indices, (None,), np.int32)
         return self
+
+    def _validate_cloth(self) -> None:
+        shape = (self.num_frames, self.garment.num_vertices, 3)
+        self._array("positions", self.positions, shape, np.float32)
 
     def _validate_obstacle(self) -> None:
         vertices, faces = self.obstacle_vertices, self.obstacle_faces

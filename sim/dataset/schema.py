@@ -17,6 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 SCHEMA_VERSION = 1
+"""Of the folder and its header."""
+SAMPLE_VERSION = 1
+"""Of a sample of fixed topology: its form did not change when remeshed sequences came."""
+REMESHED_SAMPLE_VERSION = 2
+"""Of a sequence whose topology changes; the newest."""
 FORMAT = "muslin dataset"
 
 HEADER = "muslin.json"
@@ -28,8 +33,12 @@ LOCK = ".lock"
 SUFFIX = ".zarr"
 
 CHUNK_BYTES = 1 << 20
-"""Frames are gathered in chunks of about this size, so that one frame can be read without the whole
-sequence."""
+"""Frames (or their rows) are gathered in chunks of about this size, so that one frame can be read without the
+whole sequence."""
+
+
+STACKED = "stacked_"
+"""Begins the name of a dimension that counts the rows of all topologies, or frames, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +50,9 @@ class ArraySpec:
     meaning: str
 
     @property
-    def by_frame(self) -> bool:
-        return self.dimensions[0] == "frame"
+    def by_rows(self) -> bool:
+        """Whether the first dimension may be long: then it is cut into chunks."""
+        return self.dimensions[0] == "frame" or self.dimensions[0].startswith(STACKED)
 
 
 GARMENT_ARRAYS = {
@@ -67,8 +77,25 @@ SAMPLE_ARRAYS = {
 
 ARRAYS = GARMENT_ARRAYS | SAMPLE_ARRAYS
 
+REMESHED_ARRAYS = {
+    **{
+        name: ArraySpec(
+            spec.dtype,
+            (STACKED + spec.dimensions[0], *spec.dimensions[1:]),
+            f"{spec.meaning}; topology after topology, indices counted within each",
+        )
+        for name, spec in GARMENT_ARRAYS.items()
+    },
+    "positions": ArraySpec("float32", (STACKED + "vertex", "xyz"), "cloth, frame after frame, metres"),
+    "frame_topology": ArraySpec("int32", ("frame",), "topology of each frame"),
+    "topology_sizes": ArraySpec(
+        "int32", ("topology", "size"), "numbers of vertices, faces and panel vertices of each topology"
+    ),
+}
+"""Instead of, or beside, the arrays of the same names where the topology changes."""
 
-def chunk_frames(shape: tuple[int, ...], itemsize: int) -> int:
-    """Frames in one chunk of an array whose first dimension counts frames."""
-    frame_bytes = max(1, int(np.prod(shape[1:])) * itemsize)
-    return int(np.clip(CHUNK_BYTES // frame_bytes, 1, max(1, shape[0])))
+
+def chunk_rows(shape: tuple[int, ...], itemsize: int) -> int:
+    """Rows (frames, say) in one chunk of an array that is cut into chunks along its first dimension."""
+    row_bytes = max(1, int(np.prod(shape[1:])) * itemsize)
+    return int(np.clip(CHUNK_BYTES // row_bytes, 1, max(1, shape[0])))

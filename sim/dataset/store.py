@@ -14,20 +14,22 @@ import zarr
 from zarr.codecs import BloscCname, BloscCodec, BloscShuffle
 
 from muslin.garments.errors import InputError
-from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.cloth_arrays import cloth_arrays, cloth_of
 from muslin.sim.dataset.header import digest
+from muslin.sim.dataset.remeshed import RemeshedSequence
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.dataset.schema import (
     ARRAYS,
-    GARMENT_ARRAYS,
     PARTIAL,
+    REMESHED_ARRAYS,
+    REMESHED_SAMPLE_VERSION,
+    SAMPLE_VERSION,
     SAMPLES,
-    SCHEMA_VERSION,
     SUFFIX,
     ArraySpec,
-    chunk_frames,
+    chunk_rows,
 )
 
 _REMEDY = "delete the folder of this sample and run `muslin generate` again, or restore it from a copy"
@@ -57,8 +59,10 @@ def write_sample(root: Path, sample: Sample) -> bool:
     Raises InputError if the sample's arrays cannot be (see `Sample.validate`).
     """
     sample.validate()
-    sample.garment.validate()
-    arrays = _arrays(sample)
+    for garment in sample.garments:
+        garment.validate()
+    specs = ARRAYS | REMESHED_ARRAYS if isinstance(sample, RemeshedSequence) else ARRAYS
+    arrays = _arrays(sample, specs)
     meta = _meta(sample)
     checksums = {name: _sha256(array) for name, array in arrays.items()}
     partial = root / PARTIAL / f"{sample.id}-{os.getpid()}{SUFFIX}"
@@ -67,7 +71,7 @@ def write_sample(root: Path, sample: Sample) -> bool:
         attributes={"meta": meta, "meta_sha256": digest(meta), "sha256": checksums},
     )
     for name, array in arrays.items():
-        _write_array(group, name, array, ARRAYS[name])
+        _write_array(group, name, array, specs[name])
     return durable.commit_directory(partial, sample_path(root, sample.id))
 
 
@@ -83,10 +87,10 @@ def read_meta(root: Path, sample_id: str) -> tuple[dict[str, Any], dict[str, str
     meta, checksums = attributes.get("meta"), attributes.get("sha256")
     if not isinstance(meta, dict) or not isinstance(checksums, dict):
         raise InputError(f"{path}/zarr.json: not the attributes of a sample; {_REMEDY}")
-    if meta.get("schema_version", 0) > SCHEMA_VERSION:
+    if meta.get("schema_version", 0) > REMESHED_SAMPLE_VERSION:
         raise InputError(
-            f"{path}: schema_version = {meta['schema_version']} is newer than {SCHEMA_VERSION}, the newest "
-            "that this program reads; update muslin (pip install -U muslin)"
+            f"{path}: schema_version = {meta['schema_version']} is newer than {REMESHED_SAMPLE_VERSION}, the "
+            "newest that  this program reads; update muslin (pip install -U muslin)"
         )
     if attributes.get("meta_sha256") != digest(meta):
         raise InputError(f"{path}/zarr.json: attributes do not match their checksum; {_REMEDY}")
@@ -103,6 +107,8 @@ def read_sample(root: Path, sample_id: str) -> Sample:
         sample = _assemble(meta, arrays)
     except (KeyError, TypeError) as error:
         raise InputError(f"{path}: the sample lacks {error}; {_REMEDY}") from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}; {_REMEDY}") from error
     if sample.id != sample_id:
         raise InputError(f"{path}: holds sample {sample.id!r}; rename the folder to {sample.id}{SUFFIX}")
     return sample.validate()
@@ -127,9 +133,8 @@ def stored_bytes(root: Path, sample_id: str) -> int:
     return sum(p.stat().st_size for p in sample_path(root, sample_id).rglob("*") if p.is_file())
 
 
-def _arrays(sample: Sample) -> dict[str, np.ndarray]:
-    arrays: dict[str, np.ndarray | None] = {name: getattr(sample.garment, name) for name in GARMENT_ARRAYS}
-    arrays["positions"] = sample.positions
+def _arrays(sample: Sample, specs: Mapping[str, ArraySpec]) -> dict[str, np.ndarray]:
+    arrays: dict[str, np.ndarray | None] = {**cloth_arrays(sample)}
     if sample.body is not None:
         arrays |= {name: getattr(sample.body, name) for name in ("beta", "poses", "translations")}
     arrays["obstacle_vertices"] = sample.obstacle_vertices
@@ -138,7 +143,7 @@ def _arrays(sample: Sample) -> dict[str, np.ndarray]:
         arrays["masked_counts"] = np.array([len(indices) for indices in sample.masked_faces], dtype=np.int32)
         arrays["masked_indices"] = np.concatenate(sample.masked_faces).astype(np.int32)
     return {
-        name: np.ascontiguousarray(array, dtype=np.dtype(ARRAYS[name].dtype).newbyteorder("<"))
+        name: np.ascontiguousarray(array, dtype=np.dtype(specs[name].dtype).newbyteorder("<"))
         for name, array in arrays.items()
         if array is not None
     }
@@ -146,17 +151,19 @@ def _arrays(sample: Sample) -> dict[str, np.ndarray]:
 
 def _meta(sample: Sample) -> dict[str, Any]:
     body = None if sample.body is None else {"model": sample.body.model, "digest": sample.body.digest}
-    return {
-        "schema_version": SCHEMA_VERSION,
+    garment = sample.frame_garment(0)
+    remeshed = isinstance(sample, RemeshedSequence)
+    meta = {
+        "schema_version": REMESHED_SAMPLE_VERSION if remeshed else SAMPLE_VERSION,
         "id": sample.id,
         "kind": sample.kind,
         "fps": sample.fps,
         "frames": sample.num_frames,
-        "vertices": sample.garment.num_vertices,
+        "vertices": sample.num_vertices,
         "garment": {
-            "name": sample.garment.name,
-            "panel_names": list(sample.garment.panel_names),
-            "parameters": {key: float(value) for key, value in sample.garment.parameters.items()},
+            "name": garment.name,
+            "panel_names": list(garment.panel_names),
+            "parameters": {key: float(value) for key, value in garment.parameters.items()},
         },
         "body": body,
         "fabric": sample.fabric,
@@ -165,15 +172,10 @@ def _meta(sample: Sample) -> dict[str, Any]:
         "scene": sample.scene,
         "certificate": sample.certificate.to_dict(),
     }
+    return meta | {"topologies": len(sample.garments)} if remeshed else meta
 
 
 def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
-    garment = GarmentMesh(
-        **{name: arrays[name] for name in GARMENT_ARRAYS},
-        panel_names=tuple(meta["garment"]["panel_names"]),
-        name=meta["garment"]["name"],
-        parameters=meta["garment"]["parameters"],
-    )
     body = None
     if meta["body"] is not None:
         track = {name: arrays[name] for name in ("beta", "poses", "translations")}
@@ -181,11 +183,12 @@ def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
     masked: tuple[np.ndarray, ...] = ()
     if "masked_counts" in arrays:
         masked = tuple(np.split(arrays["masked_indices"], np.cumsum(arrays["masked_counts"])[:-1]))
-    return Sample(
+    cloth = cloth_of(meta["garment"], arrays)
+    form = RemeshedSequence if "topologies" in cloth else Sample
+    return form(
+        **cloth,
         id=meta["id"],
         kind=meta["kind"],
-        garment=garment,
-        positions=arrays["positions"],
         certificate=Certificate.from_dict(meta["certificate"]),
         fps=meta["fps"],
         body=body,
@@ -202,9 +205,9 @@ def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
 def _write_array(group: zarr.Group, name: str, array: np.ndarray, spec: ArraySpec) -> None:
     chunks = tuple(max(1, n) for n in array.shape)
     shards = None
-    if spec.by_frame and (frames := chunk_frames(array.shape, array.itemsize)) < array.shape[0]:
-        chunks = (frames, *chunks[1:])
-        shards = (-(-array.shape[0] // frames) * frames, *chunks[1:])
+    if spec.by_rows and (rows := chunk_rows(array.shape, array.itemsize)) < array.shape[0]:
+        chunks = (rows, *chunks[1:])
+        shards = (-(-array.shape[0] // rows) * rows, *chunks[1:])
     group.create_array(
         name,
         data=array,

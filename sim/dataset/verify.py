@@ -156,7 +156,8 @@ def _check_frame(sample: Sample, frame: int, masked: np.ndarray) -> tuple[tuple[
         return (0, 0), f"masked faces must be from 0 to {len(faces) - 1}"
     kept = np.ones(len(faces), dtype=bool)
     kept[masked] = False
-    counts = count_intersections(sample.positions[frame], sample.garment.faces, body, faces[kept])
+    cloth = sample.frame_garment(frame).faces
+    counts = count_intersections(sample.frame_positions(frame), cloth, body, faces[kept])
     reasons = []
     if counts.cloth_cloth:
         reasons.append(f"{counts.cloth_cloth} cloth-cloth intersections")
@@ -205,7 +206,8 @@ def _run(task: _Task) -> Finding:
 @lru_cache(maxsize=2)
 def _sample(root: Path, sample_id: str) -> Sample:
     sample = store.read_sample(root, sample_id)
-    sample.garment.validate()
+    for garment in sample.garments:
+        garment.validate()
     return sample
 
 

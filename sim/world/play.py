@@ -58,7 +58,7 @@ def play(scene: Scene, device: str, tick: Tick) -> Sample:
         seed=scene.seed,
     )
     distance = min(frame[2] for frame in frames)
-    return certify(sample, stage.cloth, solved(scene, distance, rest, started, len(frames)))
+    return certify(sample, solved(scene, distance, rest, started, len(frames)))
 
 
 _Frame = tuple[NDArray[np.float64], NDArray[np.float64], float]

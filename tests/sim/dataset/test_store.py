@@ -15,7 +15,7 @@ from muslin.sim.dataset import store
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.header import Header, digest, prepare_root
 from muslin.sim.dataset.sample import BodyTrack
-from muslin.sim.dataset.schema import ARRAYS, CHUNK_BYTES, PARTIAL, chunk_frames
+from muslin.sim.dataset.schema import ARRAYS, CHUNK_BYTES, PARTIAL, chunk_rows
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_masks_that_are_all_empty_stay_empty(root: Path) -> None:
 
 def test_a_long_sequence_is_one_shard_of_many_chunks(root: Path) -> None:
     sample = make_sample(frames=1500)
-    assert chunk_frames(sample.positions.shape, 4) == CHUNK_BYTES // (81 * 12)
+    assert chunk_rows(sample.positions.shape, 4) == CHUNK_BYTES // (81 * 12)
     store.write_sample(root, sample)
     folder = store.sample_path(root, "sheet") / "positions"
     assert [p.name for p in folder.rglob("*") if p.is_file() and p.name != "zarr.json"] == ["0"]
@@ -140,10 +140,10 @@ def test_a_sample_of_a_newer_schema_is_refused(root: Path) -> None:
     store.write_sample(root, make_sample())
     file = store.sample_path(root, "sheet") / "zarr.json"
     values = json.loads(file.read_text())
-    values["attributes"]["meta"]["schema_version"] = 2
+    values["attributes"]["meta"]["schema_version"] = 3
     values["attributes"]["meta_sha256"] = digest(values["attributes"]["meta"])
     file.write_text(json.dumps(values))
-    with pytest.raises(InputError, match=r"newer than 1.*update muslin"):
+    with pytest.raises(InputError, match=r"newer than 2.*update muslin"):
         store.read_sample(root, "sheet")
 
 
