@@ -34,33 +34,34 @@ def fabric_colour(name: str) -> tuple[float, float, float]:
     return PALETTE[hashlib.sha256(name.encode()).digest()[0] % len(PALETTE)]
 
 
-def garment_colours(sample: Sample) -> np.ndarray:
-    """Colour of a sample's cloth: (3,), or (V, 3) with one of the palette for each of several garments."""
+def garment_colours(sample: Sample, frame: int = 0) -> np.ndarray:
+    """Colour of a sample's cloth: (3,), or (V_t, 3) with one of the palette for each of several garments."""
     first = fabric_colour(sample.fabric)
-    owner = face_owner(sample.garment)
+    garment = sample.frame_garment(frame)
+    owner = face_owner(garment)
     if not owner.any():
         return np.array(first)
-    vertex_owner = np.zeros(sample.garment.num_vertices, dtype=np.int64)
-    vertex_owner[sample.garment.faces] = owner[:, None]
+    vertex_owner = np.zeros(garment.num_vertices, dtype=np.int64)
+    vertex_owner[garment.faces] = owner[:, None]
     return np.array(PALETTE)[(PALETTE.index(first) + vertex_owner) % len(PALETTE)]
 
 
 def sample_layers(sample: Sample, frame: int = 0, colours: np.ndarray | None = None) -> list[Layer]:
     """Body (or obstacle) and garment of a frame.
 
-    colours   (V, 3) sRGB of the garment's vertices, such as a heat map; None for the colours of its fabrics
+    colours   (V_t, 3) sRGB of the garment's vertices, such as a heat map; None for the colours of its fabrics
     """
     layers = []
     body_vertices = sample.body_vertices(frame)
     if len(body_vertices):
         skin = SKIN if sample.body is not None else OBSTACLE
         layers.append(Layer(body_vertices, sample.body_faces, np.array(skin), gloss=0.12))
-    garment = sample.garment
+    garment = sample.frame_garment(frame)
     layers.append(
         Layer(
-            sample.positions[frame].astype(np.float64),
+            sample.frame_positions(frame).astype(np.float64),
             garment.faces,
-            garment_colours(sample) if colours is None else colours,
+            garment_colours(sample, frame) if colours is None else colours,
             sheet=True,
             gloss=0.02,
             seams=seam_edges(garment.faces, garment.panel_faces),
@@ -100,7 +101,7 @@ def sample_cameras(
     for frame in frames:
         body = sample.body_vertices(frame)
         some = body[:: max(1, len(body) // 2000)]
-        clouds.append(np.concatenate([sample.positions[frame].astype(np.float64), some]))
+        clouds.append(np.concatenate([sample.frame_positions(frame).astype(np.float64), some]))
     ground = min(float(cloud[:, 1].min()) for cloud in clouds)
     middles = np.array([0.5 * (cloud.min(axis=0) + cloud.max(axis=0)) for cloud in clouds])
     middles[:, 1] = 0.0

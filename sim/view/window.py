@@ -50,6 +50,17 @@ def paint(layer: Layer) -> dict[str, Any]:
     return {"scalars": np.rint(255.0 * layer.colour).astype(np.uint8), "rgb": True}
 
 
+def draw(plotter: Any, sample: Sample, frame: int) -> None:
+    """Put a frame of a sample into a PyVista plotter, in place of the frame that it shows."""
+    import pyvista as pv
+
+    for k, layer in enumerate(sample_layers(sample, frame)):
+        mesh = pv.PolyData.from_regular_faces(layer.vertices, layer.faces)
+        look = {"smooth_shading": True, "specular": layer.gloss, **paint(layer)}
+        # A new actor each time: the topology may be another one.
+        plotter.add_mesh(mesh, name=f"layer {k}", reset_camera=False, **look)
+
+
 def show(sample: Sample) -> None:
     """Open a window with the sample; a sequence gets a slider over its frames. Returns when it is closed."""
     require_display()
@@ -57,16 +68,10 @@ def show(sample: Sample) -> None:
 
     plotter: Any = pv.Plotter(title=f"muslin: {sample.id}", window_size=[900, 1100], lighting="three lights")
     plotter.set_background("#f4f3f0", top="#ffffff")
-    meshes = []
-    for layer in sample_layers(sample, 0):
-        mesh = pv.PolyData.from_regular_faces(layer.vertices, layer.faces)
-        plotter.add_mesh(mesh, **paint(layer), smooth_shading=True, specular=layer.gloss)
-        meshes.append(mesh)
+    draw(plotter, sample, 0)
 
     def show_frame(value: float) -> None:
-        for mesh, layer in zip(meshes, sample_layers(sample, round(value)), strict=True):
-            mesh.points = np.asarray(layer.vertices)
-            mesh.compute_normals(inplace=True)
+        draw(plotter, sample, round(value))
 
     if sample.num_frames > 1:
         plotter.add_slider_widget(
