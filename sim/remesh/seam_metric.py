@@ -1,0 +1,99 @@
+"""Metrics on seams: both sides of a seam are one row of edges, and must agree on how long these are.
+
+The panels of the two sides are turned against each other, so their tensors cannot be compared. What has a
+meaning on both is the length along the seam: m = t^T M t, 1/m^2, t the unit vector along it in the panel.
+
+Two ways to make them agree: `sewn_edge_lengths` takes the larger size of the two sides, which is what decides
+whether an edge of the garment is split. `agree_on_seams` raises the tensors themselves beforehand, so that
+the triangles behind the seam suit its edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from muslin.garments.mesh import GarmentMesh
+from muslin.sim.remesh.metric import edge_lengths, quadratic_form
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class SeamEdges:
+    """Half edges of panels that are sewn to another: `tail` and `head` (S,) panel vertices in the direction
+    of the face, and `twin_tail`, `twin_head` (S,), those of the other side's, which runs the other way; so
+    tail and twin_head are one vertex of the garment. Both sides are listed."""
+
+    tail: Index
+    head: Index
+    twin_tail: Index
+    twin_head: Index
+
+    @staticmethod
+    def of(mesh: GarmentMesh) -> SeamEdges:
+        start, end = _half_edges(mesh.panel_faces)
+        copies = np.bincount(mesh.panel_to_vertex, minlength=mesh.num_vertices)[mesh.panel_to_vertex]
+        # A dart begins at a vertex that has no copy.
+        near = (copies[start] > 1) | (copies[end] > 1)
+        start, end = start[near], end[near]
+        if not len(start):
+            return SeamEdges(start, end, start, end)
+        size = mesh.num_vertices
+        sewn_start, sewn_end = (mesh.panel_to_vertex[side].astype(np.int64) for side in (start, end))
+        key, opposite = sewn_start * size + sewn_end, sewn_end * size + sewn_start
+        order = np.argsort(key)
+        slot = np.minimum(np.searchsorted(key, opposite, sorter=order), len(order) - 1)
+        twin = order[slot]
+        sewn = (key[twin] == opposite) & ((start[twin] != end) | (end[twin] != start))
+        twin = twin[sewn]
+        return SeamEdges(start[sewn], end[sewn], start[twin], end[twin])
+
+
+def sewn_edge_lengths(mesh: GarmentMesh, metric: Array) -> Array:
+    """(E,) sizes of `mesh.edges` in a metric (P, 2, 2) on panel vertices; of the two sides of a seam, the
+    larger."""
+    start, end = _half_edges(mesh.panel_faces)
+    size = edge_lengths(mesh.panel_vertices, np.stack([start, end], axis=1), metric)
+    pair = np.sort(np.stack([mesh.panel_to_vertex[start], mesh.panel_to_vertex[end]], axis=1), axis=1)
+    weights = np.array([mesh.num_vertices, 1])
+    edge = np.searchsorted(mesh.edges @ weights, pair @ weights)
+    lengths = np.zeros(len(mesh.edges))
+    np.maximum.at(lengths, edge, size)
+    return lengths
+
+
+def agree_on_seams(mesh: GarmentMesh, metric: Array) -> Array:
+    """(P, 2, 2) metric, nowhere smaller, in which both sides of a seam ask for the same along it.
+
+    Of the metrics that dominate M and have t^T M' t = m', the one of smallest determinant is
+
+        M' = M + (m' - m) / m^2 (M t)(M t)^T,  m = t^T M t:
+
+    where M = I it is I + (m' - 1) t t^T, and all that is asked holds in any frame. A seam vertex takes m'
+    from the other side along the seam edge ahead, then along the one behind. On a straight seam both are one
+    direction and the sides agree exactly; where a seam bends or ends, all but for the turn from edge to edge.
+
+    `metric` has to be positive definite, as `muslin.sim.remesh.metric.clamp` leaves it.
+    """
+    seams = SeamEdges.of(mesh)
+    points, raised = mesh.panel_vertices, metric.copy()
+    own, other = points[seams.head] - points[seams.tail], points[seams.twin_head] - points[seams.twin_tail]
+    own /= np.linalg.norm(own, axis=1)[:, None]
+    other /= np.linalg.norm(other, axis=1)[:, None]
+    # A panel vertex is at most once a tail, and at most once a head.
+    for vertex, beyond in ((seams.tail, seams.twin_head), (seams.head, seams.twin_tail)):
+        here = raised[vertex]
+        m = quadratic_form(here, own)
+        more = np.maximum(quadratic_form(raised[beyond], other) - m, 0.0)
+        w = (here * own[:, None, :]).sum(axis=2) / m[:, None]
+        raised[vertex] = here + more[:, None, None] * w[:, :, None] * w[:, None, :]
+    return raised
+
+
+def _half_edges(faces: NDArray[np.int32]) -> tuple[Index, Index]:
+    """Start and end (3 F,) of the edges of faces (F, 3)."""
+    return faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
