@@ -66,6 +66,37 @@ def compare(
 
 
 @app.command()
+def remesh(
+    out: Out = OUT / "remesh",
+    peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",
+    presets: Annotated[str, typer.Option(help="Presets of the tee.")] = "top,sweater,long_dress",
+    sizes: Annotated[
+        str, typer.Option(help="Vertices of source and target, about.")
+    ] = "4000:1400,4000:3600,17246:3600,17246:17000",
+    rounds: Rounds = 5,
+    core: Core = 0,
+    only: Annotated[str, typer.Option(help="Remeshers to run beside muslin.")] = "mmg,mmg_kept,botsch",
+) -> None:
+    """Remesh the same panels with muslin and every peer; write remesh.md and remesh.json."""
+    from benchmarks import remesh as side_by_side
+    from benchmarks.contenders.catalogue import named
+    from benchmarks.remeshers.catalogue import REMESHERS
+
+    chosen = named(only, REMESHERS)
+    absent = {c.name: why for c in chosen if (why := c.missing(peers)) is not None}
+    for name, why in absent.items():
+        typer.echo(f"left out: {name}: {why}", err=True)
+    present = [c for c in chosen if c.name not in absent]
+    cases = side_by_side.cases_of(presets, sizes)
+    results = side_by_side.compare(cases, present, peers, out, rounds, core, typer.echo)
+    left_out = "".join(f"- **{name}** was left out: {why}\n" for name, why in absent.items())
+    table = side_by_side.table(cases, results) + left_out
+    (out / "remesh.md").write_text(f"{machine()}\n\n{table}", encoding="utf-8")
+    _write(out / "remesh.json", {"results": side_by_side.as_json(results), "left_out": absent})
+    typer.echo(table)
+
+
+@app.command()
 def drape(
     out: Out = OUT,
     neighbours: Annotated[int, typer.Option(min=0, help="Drapes that start from the one before.")] = 4,

@@ -85,12 +85,12 @@ CONTENDERS = (
 )
 
 
-def named(names: str) -> tuple[Contender, ...]:
-    """Contenders whose modules a comma-separated list names, muslin first; ValueError for unknown ones."""
+def named(names: str, contenders: tuple[Contender, ...] = CONTENDERS) -> tuple[Contender, ...]:
+    """Those whose modules a comma-separated list names, muslin first; ValueError for unknown ones."""
     wanted = {name.strip() for name in names.split(",")}
-    known = {contender.module for contender in CONTENDERS}
+    known = {contender.module for contender in contenders}
     if not wanted <= known:
         raise ValueError(
             f"no contender {', '.join(sorted(wanted - known))}; choose from {', '.join(sorted(known))}"
         )
-    return tuple(c for c in CONTENDERS if c.module in wanted or c is MUSLIN)
+    return tuple(c for c in contenders if c.module in wanted or c is contenders[0])
