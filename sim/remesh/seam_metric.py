@@ -69,15 +69,15 @@ def sewn_edge_lengths(mesh: GarmentMesh, metric: Array) -> Array:
 def agree_on_seams(mesh: GarmentMesh, metric: Array) -> Array:
     """(P, 2, 2) metric, nowhere smaller, in which both sides of a seam ask for the same along it.
 
-    Of the metrics that dominate M and have t^T M' t = m', the one of smallest determinant is
+        M' = M + (m' - m) t t^T,  m = t^T M t
 
-        M' = M + (m' - m) / m^2 (M t)(M t)^T,  m = t^T M t:
+    asks for m' along t, for no more than m' - m in addition in any direction, and for nothing across. A seam
+    vertex takes m' from the other side along the seam edge ahead, then along the one behind. On a straight
+    seam both are one direction and the sides agree exactly; where a seam bends or ends, all but for the turn
+    from edge to edge.
 
-    where M = I it is I + (m' - 1) t t^T, and all that is asked holds in any frame. A seam vertex takes m'
-    from the other side along the seam edge ahead, then along the one behind. On a straight seam both are one
-    direction and the sides agree exactly; where a seam bends or ends, all but for the turn from edge to edge.
-
-    `metric` has to be positive definite, as `muslin.sim.remesh.metric.clamp` leaves it.
+    (The bound of smallest determinant, M + (m' - m) / m^2 (M t)(M t)^T, makes a tenth fewer triangles at
+    seams, but M t may lie far off t: where seams bend, what it adds for one edge spoils the next one.)
     """
     seams = SeamEdges.of(mesh)
     points, raised = mesh.panel_vertices, metric.copy()
@@ -86,11 +86,8 @@ def agree_on_seams(mesh: GarmentMesh, metric: Array) -> Array:
     other /= np.linalg.norm(other, axis=1)[:, None]
     # A panel vertex is at most once a tail, and at most once a head.
     for vertex, beyond in ((seams.tail, seams.twin_head), (seams.head, seams.twin_tail)):
-        here = raised[vertex]
-        m = quadratic_form(here, own)
-        more = np.maximum(quadratic_form(raised[beyond], other) - m, 0.0)
-        w = (here * own[:, None, :]).sum(axis=2) / m[:, None]
-        raised[vertex] = here + more[:, None, None] * w[:, :, None] * w[:, None, :]
+        more = quadratic_form(raised[beyond], other) - quadratic_form(raised[vertex], own)
+        raised[vertex] += np.maximum(more, 0.0)[:, None, None] * own[:, :, None] * own[:, None, :]
     return raised
 
 

@@ -114,25 +114,20 @@ def test_the_sides_of_a_straight_seam_agree_exactly(angle: float) -> None:
     np.testing.assert_allclose(here, there, rtol=1e-12)
 
 
-def test_agreement_is_the_smallest_rise_that_brings_it(tee: GarmentMesh, field: Array) -> None:
-    """Nothing shrinks, nothing changes off the seams, the chord conjugate to the seam keeps its length."""
-    raised = agree_on_seams(tee, field)
-    rise = raised - field
+def test_agreement_adds_along_the_seam_and_nowhere_else(tee: GarmentMesh, field: Array) -> None:
+    rise = agree_on_seams(tee, field) - field
     assert eigenvalues(rise)[:, 1].min() > -1e-10 * np.abs(field).max()
     seams = SeamEdges.of(tee)
     off = np.setdiff1d(np.arange(len(field)), np.concatenate([seams.tail, seams.head]))
     np.testing.assert_array_equal(rise[off], 0.0)
-    ends = np.setdiff1d(seams.tail, seams.head)  # one seam edge, so one rise
-    assert len(ends) > 3
-    t = {
-        int(a): tee.panel_vertices[b] - tee.panel_vertices[a]
-        for a, b in zip(seams.tail, seams.head, strict=True)
-    }
-    direction = np.array([t[int(v)] for v in ends])
-    conjugate = np.einsum("nij,nj->ni", field[ends], direction) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    kept = quadratic_form(field[ends], conjugate)
-    np.testing.assert_allclose(quadratic_form(raised[ends], conjugate), kept, rtol=1e-9)
-    assert (quadratic_form(raised[ends], direction) > 1.01 * quadratic_form(field[ends], direction)).any()
+    first = ~np.isin(seams.tail, seams.head)  # a vertex of one seam edge
+    t = (tee.panel_vertices[seams.head] - tee.panel_vertices[seams.tail])[first]
+    added = rise[seams.tail[first]]
+    assert len(added) > 3
+    across = t @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    np.testing.assert_allclose(quadratic_form(added, across), 0.0, atol=1e-12)
+    here = quadratic_form(field[seams.tail[first]], t) / (t * t).sum(axis=1)
+    assert (quadratic_form(added, t) > 0.01 * here * (t * t).sum(axis=1)).any()
 
 
 def test_the_sides_of_a_garment_s_seams_agree_but_for_their_bends(tee: GarmentMesh, field: Array) -> None:
@@ -142,7 +137,8 @@ def test_the_sides_of_a_garment_s_seams_agree_but_for_their_bends(tee: GarmentMe
     after = np.abs(np.log(here / there))
     assert np.median(before) > 0.3
     assert np.median(after) < 0.05
-    assert after.mean() < 0.25 * before.mean()
+    assert after.mean() < 0.1 * before.mean()
+    assert after.max() < 0.5
 
 
 def test_the_sizing_of_a_garment_agrees_on_its_seams(tee: GarmentMesh) -> None:
