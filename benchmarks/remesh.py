@@ -158,6 +158,8 @@ def table(cases: Sequence[Case], results: list[Result]) -> str:
         "CV of areas",
         "degenerate, inverted",
         "largest length error, %",
+        "boundary moved, mm",
+        "largest error of a panel's area, %",
         "unmatched seam vertices",
         "CPU s",
         "over muslin",
@@ -191,7 +193,8 @@ def as_json(results: list[Result]) -> list[dict[str, object]]:
 
 
 def _quality_cells(found: MeshQuality) -> list[str]:
-    error = np.nan if found.curve_error is None else found.curve_error
+    errors = found.curve_error, found.curve_distance, found.panel_area_error
+    length, distance, area = (np.nan if error is None else error for error in errors)
     return [
         str(found.panel_vertices),
         str(found.faces),
@@ -199,6 +202,8 @@ def _quality_cells(found: MeshQuality) -> list[str]:
         f"{100.0 * (1.0 - found.below_good):.2f}",
         f"{found.area_variation:.3f}",
         f"{found.degenerate}, {found.inverted}",
-        f"{100.0 * error:.2f}",
+        f"{100.0 * length:.3f}",
+        f"{1e3 * distance:.2f}",
+        f"{100.0 * area:.3f}",
         str(found.seam_mismatches),
     ]

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.eval.metrics.hausdorff import hausdorff
-from muslin.eval.metrics.panel_curves import boundary_angles, curve_length_errors, mismatched_seam_vertices
+from muslin.eval.metrics.panel_curves import (
+    boundary_angles,
+    curve_distances,
+    curve_length_errors,
+    mismatched_seam_vertices,
+)
 from muslin.eval.metrics.surface_sampling import surface_distance
 from muslin.eval.metrics.triangle_quality import (
     angles,
@@ -44,6 +49,8 @@ class MeshQuality:
     area_variation: coefficient of variation of the areas
     degenerate, inverted, degenerate_uv, inverted_uv: see `degenerate_and_inverted`; in panel space and in uv
     curve_error: largest relative error of the length of a boundary or seam curve; None without a source
+    curve_distance: farthest that such a curve lies from the source's, metres; None without a source
+    panel_area_error: largest relative error of a panel's area; None without a source
     seam_mismatches: see `mismatched_seam_vertices`; None without a source
     surface: distance to the source; None without positions of both
     """
@@ -62,6 +69,8 @@ class MeshQuality:
     degenerate_uv: int
     inverted_uv: int
     curve_error: float | None = None
+    curve_distance: float | None = None
+    panel_area_error: float | None = None
     seam_mismatches: int | None = None
     surface: SurfaceError | None = None
 
@@ -97,6 +106,8 @@ def quality(
         degenerate_uv=degenerate_uv,
         inverted_uv=inverted_uv,
         curve_error=None if source is None else float(curve_length_errors(mesh, source).max()),
+        curve_distance=None if source is None else float(curve_distances(mesh, source).max()),
+        panel_area_error=None if source is None else float(panel_area_errors(mesh, source).max()),
         seam_mismatches=None if source is None else mismatched_seam_vertices(mesh, source),
         surface=_surface_error(mesh, source, positions, source_positions),
     )
@@ -122,6 +133,14 @@ def forced_corners(
         near = np.linalg.norm(mesh.panel_vertices - given.panel_vertices[corner], axis=1) <= ON_CORNER
         excused |= near & (mesh.panel_vertex_panel == given.panel_vertex_panel[corner])
     return excused[mesh.panel_faces]
+
+
+def panel_area_errors(mesh: GarmentMesh, source: GarmentMesh) -> NDArray[np.float64]:
+    """|a - A| / A of each panel of `source`; a its area in `mesh`, A in `source`."""
+    count = len(source.panel_names)
+    area = np.bincount(mesh.face_panel, mesh.face_areas, minlength=count)
+    given = np.bincount(source.face_panel, source.face_areas, minlength=count)
+    return np.abs(area - given) / given
 
 
 def _surface_error(

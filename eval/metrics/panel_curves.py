@@ -154,6 +154,21 @@ def curve_length_errors(mesh: GarmentMesh, source: GarmentMesh) -> NDArray[np.fl
     return errors
 
 
+def curve_distances(mesh: GarmentMesh, source: GarmentMesh) -> NDArray[np.float64]:
+    """How far each curve of `source` and what took its place in `mesh` are apart in panel space, metres.
+
+    max( max_i d(a_i, B), max_j d(b_j, A) ), a_i and b_j the vertices of the polylines A and B, d the distance
+    to the nearest point of the other. Infinite for a curve that `mesh` does not have.
+    """
+    curves = pattern_curves(source)
+    distances = np.full(len(curves.chains), np.inf)
+    for k, chain in enumerate(corresponding_chains(mesh, source, curves)):
+        if chain is not None:
+            a, b = mesh.panel_vertices[chain], source.panel_vertices[curves.chains[k]]
+            distances[k] = max(_to_polyline(a, b).max(), _to_polyline(b, a).max())
+    return distances
+
+
 def mismatched_seam_vertices(mesh: GarmentMesh, source: GarmentMesh) -> int:
     """Vertices on the seams of `source` that have no vertex of `mesh` opposite.
 
@@ -189,6 +204,15 @@ def _partner_edges(mesh: GarmentMesh, edges: NDArray[np.int32]) -> NDArray[np.in
     partner = np.full(len(edges), -1, dtype=np.int64)
     partner[order[paired]], partner[order[paired + 1]] = order[paired + 1], order[paired]
     return partner
+
+
+def _to_polyline(points: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points (n, 2) to a polyline (m, 2); (n,)."""
+    start, along = line[:-1], np.diff(line, axis=0)
+    offset = points[:, None] - start
+    square = (along**2).sum(axis=1)
+    t = (offset * along).sum(axis=2) / np.where(square > 0.0, square, 1.0)
+    return np.linalg.norm(offset - np.clip(t, 0.0, 1.0)[..., None] * along, axis=2).min(axis=1)
 
 
 def _walk(following: NDArray[np.int32], start: int, end: int) -> Chain | None:

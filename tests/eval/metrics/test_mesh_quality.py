@@ -55,7 +55,8 @@ def test_a_square_of_right_triangles():
     assert found.mean_distortion == pytest.approx(np.sqrt(3.0)) == found.max_distortion
     assert found.area_variation == pytest.approx(0.0, abs=1e-12)
     assert (found.degenerate, found.inverted, found.degenerate_uv, found.inverted_uv) == (0, 0, 0, 0)
-    assert (found.curve_error, found.seam_mismatches, found.surface) == (None, None, None)
+    assert (found.curve_error, found.curve_distance, found.panel_area_error) == (None, None, None)
+    assert (found.seam_mismatches, found.surface) == (None, None)
 
 
 def test_what_is_broken_is_counted_where_it_is():
@@ -113,6 +114,8 @@ def test_a_boundary_that_a_mesh_made_sharp_is_not_excused():
 def test_lengths_against_the_source():
     found = quality(grid(5, 1.02), grid(4))
     assert found.curve_error == pytest.approx(0.02)
+    assert found.curve_distance == pytest.approx(0.02 * np.sqrt(2.0))  # the corner away from the origin
+    assert found.panel_area_error == pytest.approx(1.02**2 - 1.0)
     assert found.seam_mismatches == 0
 
 

@@ -1,5 +1,7 @@
 """Curves of panels, found in meshes alone, against the patterns that the meshes were cut from."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from muslin.eval.metrics.panel_curves import (
     arc_lengths,
     boundary_angles,
     corresponding_chains,
+    curve_distances,
     curve_length_errors,
     mismatched_seam_vertices,
     pattern_corners,
@@ -105,6 +108,7 @@ def test_a_mesh_keeps_its_own_curves(tee: GarmentMesh):
         for chain, own in zip(corresponding_chains(mesh, tee, curves), curves.chains, strict=True):
             np.testing.assert_array_equal(chain, own)
         assert curve_length_errors(mesh, tee).max() == 0.0
+        assert curve_distances(mesh, tee).max() == 0.0
         assert mismatched_seam_vertices(mesh, tee) == 0
 
 
@@ -120,6 +124,8 @@ def test_a_circle_without_corners_is_one_curve():
     assert [len(chain) for chain in pattern_curves(source).chains] == [65]
     expected = 1.0 - 8.0 * np.sin(np.pi / 8.0) / (64.0 * np.sin(np.pi / 64.0))
     assert curve_length_errors(mesh, source) == pytest.approx(expected)
+    # The source's vertex over the middle of a chord is its sagitta away.
+    assert curve_distances(mesh, source) == pytest.approx(1.0 - np.cos(np.pi / 8.0))
     assert not pattern_corners(disc(8)).any()
     assert pattern_corners(disc(5)).sum() == 5
 
@@ -185,6 +191,22 @@ def test_a_curve_on_a_boundary_of_its_own_is_missing():
     (side,) = [k for k, c in enumerate(curves.chains) if set(whole.panel_vertices[c][:, 0]) == {1.0}]
     assert errors[side] == np.inf
     assert np.isfinite(np.delete(errors, side)).sum() >= 5
+
+
+def test_distances_of_curves_against_points_all_along_them(tee: GarmentMesh):
+    mesh = triangulate(PATTERN, 0.025)
+    curves = pattern_curves(tee)
+    found = curve_distances(mesh, tee)
+    for k, chain in enumerate(corresponding_chains(mesh, tee, curves)):
+        pair = mesh.panel_vertices[chain], tee.panel_vertices[curves.chains[k]]
+        fine = [np.concatenate([np.linspace(p, q, 200) for p, q in pairwise(line)]) for line in pair]
+        largest = max(
+            np.linalg.norm(line[:, None] - other, axis=2).min(axis=1).max()
+            for line, other in ((pair[0], fine[1]), (pair[1], fine[0]))
+        )
+        # The nearest point of a line is at most half the spacing of its points away from one of them.
+        half = 0.5 * max(np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in fine)
+        assert found[k] <= largest <= np.hypot(found[k], half) + 1e-12
 
 
 def test_lengths_along_a_chain():
