@@ -58,9 +58,9 @@ def sewn_edge_lengths(mesh: GarmentMesh, metric: Array) -> Array:
     larger."""
     start, end = _half_edges(mesh.panel_faces)
     size = edge_lengths(mesh.panel_vertices, np.stack([start, end], axis=1), metric)
-    pair = np.sort(np.stack([mesh.panel_to_vertex[start], mesh.panel_to_vertex[end]], axis=1), axis=1)
+    a, b = (mesh.panel_to_vertex[side].astype(np.int64) for side in (start, end))
     weights = np.array([mesh.num_vertices, 1])
-    edge = np.searchsorted(mesh.edges @ weights, pair @ weights)
+    edge = np.searchsorted(mesh.edges @ weights, np.minimum(a, b) * mesh.num_vertices + np.maximum(a, b))
     lengths = np.zeros(len(mesh.edges))
     np.maximum.at(lengths, edge, size)
     return lengths
