@@ -7,7 +7,7 @@ which is where the ellipse of A lies inside that of B.
 
 All functions take stacks (N, 2, 2) float64, and are of numpy alone: no loop over elements.
 
-Source: Narain, Samii, O'Brien 2012, Adaptive anisotropic remeshing for cloth simulation, section 3.
+Source: Narain, Samii, O'Brien 2012, Adaptive anisotropic remeshing for cloth simulation.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def edge_lengths(points: Array, edges: NDArray[np.integer], metric: Array) -> Ar
     """(E,) sizes sqrt(u_ij^T (M_i + M_j) / 2 u_ij) of edges (E, 2), without unit; a mesh is fine enough
     where all are <= 1.
 
-    `points` (P, 2): panel space, metres; `metric` (P, 2, 2): 1/m^2. (Narain et al. 2012, equation 1.)
+    `points` (P, 2): panel space, metres; `metric` (P, 2, 2): 1/m^2. (Narain et al. 2012.)
     """
     i, j = edges[:, 0], edges[:, 1]
     return np.sqrt(np.maximum(quadratic_form(0.5 * (metric[i] + metric[j]), points[j] - points[i]), 0.0))

@@ -11,7 +11,7 @@ as the criterion allows. Gradients are those of linear interpolation over the fa
 `clamp` brings each into its bounds; the tensor maximum combines them. The clamp comes first because
 criteria of rank one, as of a fold, have no length along it that the maximum could weigh.
 
-Source: Narain, Samii, O'Brien 2012, Adaptive anisotropic remeshing for cloth simulation, section 4.
+Source: Narain, Samii, O'Brien 2012, Adaptive anisotropic remeshing for cloth simulation.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def compression(strain: Array, bent: Array, c: float) -> Array:
     the result continuous, so that the mesh does not flicker at the threshold. Where e and perp(S2) share no
     axes, the tensor equation interpolates between directions. Stretched directions get nothing.
 
-    Sources: Narain et al. 2012, section 4.2; Timoshenko, Gere 1961, Theory of elastic stability, chapter 11.
+    Sources: Narain et al. 2012; Timoshenko, Gere 1961, Theory of elastic stability, chapter 11.
     """
     e, turned = strain, tensors(bent[:, 1, 1], -bent[:, 0, 1], bent[:, 0, 0])
     under = squared(e) - 4.0 * c**2 * turned
