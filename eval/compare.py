@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from muslin.eval.material_points import MaterialPoints
 from muslin.eval.meshes import check_mesh
 from muslin.eval.metrics.accumulate import ErrorAccumulator, PenetrationAccumulator
 from muslin.eval.metrics.hausdorff import hausdorff
@@ -24,6 +26,10 @@ from muslin.sim.dataset.sample import Sample
 MM = 1000.0
 SURFACE_FRAMES = 24
 ONE_FRAME = "velocity errors are null: one frame only"
+BY_PANEL_SPACE = (
+    "topologies differ: vertex and velocity errors are of the truth's vertices against the points of the "
+    "prediction with the same panel-space coordinates"
+)
 
 Progress = Callable[[float, int, str], None]
 
@@ -136,8 +142,12 @@ def compare(
 ) -> Comparison:
     """Compare two datasets, samples, mesh files or folders of meshes.
 
-    Vertex and velocity errors exist where both sides have the same faces, surface distances always,
-    penetration where the truth has a closed body: both sides are measured against the truth's body.
+    Surface distances exist always, penetration where the truth has a closed body: both sides are measured
+    against the truth's body. Vertex and velocity errors exist where points correspond: vertex for vertex
+    where both sides have the same faces, else by panel space if both are meshes of one pattern with known
+    panels. They are then those of the truth's vertices, each with the point of the prediction that has the
+    same panel-space coordinates. A velocity from frame t to t + 1 is that of the truth's vertices at t + 1;
+    where a side has another topology at t, its position there is looked up by panel space too.
 
     fps              frames per second of folders of meshes; None leaves velocity errors out
     surface_frames   most frames of a sequence that get surface distances, evenly spread (they cost most)
@@ -178,11 +188,13 @@ def compare(
 
 def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairScore, Totals, list[str]]:
     for track in (prediction, truth):
-        check_mesh(track.positions, track.faces, track.name)
-    T = len(truth.positions)
-    if len(prediction.positions) != T:
+        for _, run in groupby(range(track.num_frames), key=lambda t: id(track.faces[t])):
+            same = list(run)
+            check_mesh(np.stack([track.positions[t] for t in same]), track.faces[same[0]], track.name)
+    T = truth.num_frames
+    if prediction.num_frames != T:
         raise InputError(
-            f"{prediction.name} has {len(prediction.positions)} frames and {truth.name} has {T}; "
+            f"{prediction.name} has {prediction.num_frames} frames and {truth.name} has {T}; "
             "give sequences of one length"
         )
     if T > 1 and prediction.fps != truth.fps:
@@ -203,7 +215,7 @@ def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairSc
     if len(chosen) < T:
         notes.append(f"surface distances of {len(chosen)} of {T} frames of a sequence, evenly spread")
     for t in chosen:
-        pair = (prediction.positions[t], prediction.faces, truth.positions[t], truth.faces)
+        pair = (prediction.positions[t], prediction.faces[t], truth.positions[t], truth.faces[t])
         bounds, distance = hausdorff(*pair), surface_distance(*pair)
         totals.hausdorff_lower.append(bounds.lower)
         totals.hausdorff_upper.append(bounds.upper)
@@ -214,20 +226,46 @@ def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairSc
 
 
 def _score_vertices(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
-    if prediction.positions.shape != truth.positions.shape or not np.array_equal(
-        prediction.faces, truth.faces
-    ):
-        notes.append("vertex and velocity errors are null: the meshes differ in topology")
+    points, T = MaterialPoints(), truth.num_frames
+    try:
+        seen = [points.positions(prediction, t, truth, t) for t in range(T)]
+    except InputError as error:
+        notes.append(f"vertex and velocity errors are null: {error}")
         return
-    for x, y in zip(prediction.positions, truth.positions, strict=True):
-        totals.vertex.update(vertex_errors(x, y), vertex_areas(y, truth.faces))
-    if len(truth.positions) < 2:
+    for t, x in enumerate(seen):
+        y = truth.positions[t]
+        totals.vertex.update(vertex_errors(x, y), vertex_areas(y, truth.faces[t]))
+    if T < 2:
         notes.append(ONE_FRAME)
     elif truth.fps is None:
         notes.append("velocity errors are null: the frame rate is not known; give it (--fps)")
     else:
-        for errors in velocity_errors(prediction.positions, truth.positions, truth.fps):
-            totals.velocity.update(errors)
+        _score_velocities(prediction, truth, seen, points, totals, notes)
+    if points.by_panel_space:
+        notes.append(BY_PANEL_SPACE)
+
+
+def _score_velocities(
+    prediction: Track,
+    truth: Track,
+    seen: list[np.ndarray],
+    points: MaterialPoints,
+    totals: Totals,
+    notes: list[str],
+) -> None:
+    """seen   of each frame, the prediction's positions at the truth's vertices"""
+    assert truth.fps is not None
+    try:
+        before = [
+            [points.positions(track, t - 1, truth, t) for track in (prediction, truth)]
+            for t in range(1, truth.num_frames)
+        ]
+    except InputError as error:
+        notes.append(f"velocity errors are null: {error}")
+        return
+    for t, (x, y) in enumerate(before, start=1):
+        predicted, true = np.stack([x, seen[t]]), np.stack([y, truth.positions[t]])
+        totals.velocity.update(velocity_errors(predicted, true, truth.fps)[0])
 
 
 def _score_penetration(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
@@ -237,7 +275,7 @@ def _score_penetration(prediction: Track, truth: Track, totals: Totals, notes: l
     elif not is_closed(sample.body_faces):
         notes.append("penetration is null: the truth's body or obstacle is not closed")
     else:
-        for t in range(len(truth.positions)):
+        for t in range(truth.num_frames):
             body = sample.body_vertices(t)
             totals.predicted.update(signed_distances(prediction.positions[t], body, sample.body_faces))
             totals.true.update(signed_distances(truth.positions[t], body, sample.body_faces))
@@ -262,7 +300,7 @@ def _pair(prediction: Track, truth: Track, totals: Totals, chosen: np.ndarray) -
         labels=_labels(sample),
         beta=[] if sample is None or sample.body is None else sample.body.beta.tolist(),
         fps=truth.fps,
-        num_frames=len(truth.positions),
+        num_frames=truth.num_frames,
         figures=totals.figures(),
         frames=frames,
     )

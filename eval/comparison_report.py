@@ -178,7 +178,7 @@ def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
 def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
     """Picture of the predicted surface on the true body, coloured by the distance to the true surface."""
     positions = prediction.positions[frame].astype(np.float64)
-    distance = 1000.0 * point_to_surface(positions, truth.positions[frame], truth.faces)
+    distance = 1000.0 * point_to_surface(positions, truth.positions[frame], truth.faces[frame])
     high = max(float(np.quantile(distance, 0.99)), 1e-3)
     layers = []
     azimuth = AZIMUTH
@@ -188,7 +188,7 @@ def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
         layers.append(Layer(sample.body_vertices(frame), sample.body_faces, np.array(skin)))
         azimuth += facing(sample, frame)
     shades = colours(distance, 0.0, high)
-    layers.append(Layer(positions, prediction.faces, shades, sheet=True, gloss=0.0, flat_light=True))
+    layers.append(Layer(positions, prediction.faces[frame], shades, sheet=True, gloss=0.0, flat_light=True))
     points = np.concatenate([layer.vertices for layer in layers])
     camera = frame_camera(points, *HEAT_SIZE, azimuth, ELEVATION)
     image = render(layers, camera, HEAT_SIZE, DRAFT, float(points[:, 1].min()))

@@ -3,44 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
 from muslin.garments.errors import InputError
+from muslin.garments.mesh import GarmentMesh
+from muslin.garments.obj import from_content
 from muslin.garments.obj_reader import read_obj
 
 MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
 
 
-def read_frames(files: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (T, V, 3) float64, metres, and faces (F, 3) of mesh files that share one topology."""
-    meshes = [read_mesh(file) for file in files]
-    faces = meshes[0][1]
-    for file, (vertices, other) in zip(files, meshes, strict=True):
-        if not np.array_equal(other, faces) or len(vertices) != len(meshes[0][0]):
-            raise InputError(
-                f"{file}: its faces differ from those of {files[0]}; "
-                "all frames of a sequence must have one topology"
-            )
-    return np.stack([vertices for vertices, _ in meshes]), faces
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """vertices (V, 3) float64, metres; faces (F, 3); garment: the mesh with its panels, where known."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    garment: GarmentMesh | None = None
 
 
-def read_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) float64 and faces (F, 3) int64 of a mesh file. Raises InputError as `check_mesh`."""
+def read_frames(files: Sequence[Path]) -> list[Surface]:
+    """Surfaces of the mesh files of a sequence; frames that follow in one topology share its faces and
+    garment."""
+    frames: list[Surface] = []
+    for file in files:
+        now = read_mesh(file)
+        before = frames[-1] if frames else now
+        if np.array_equal(now.faces, before.faces) and _same_panels(now.garment, before.garment):
+            now = replace(before, vertices=now.vertices)
+        frames.append(now)
+    return frames
+
+
+def _same_panels(a: GarmentMesh | None, b: GarmentMesh | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return np.array_equal(a.panel_faces, b.panel_faces) and np.array_equal(a.panel_vertices, b.panel_vertices)
+
+
+def read_mesh(path: Path) -> Surface:
+    """The surface in a mesh file, vertices as in the file. Raises InputError as `check_mesh`."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a mesh ({', '.join(MESH_SUFFIXES)})")
     if path.suffix.lower() == ".obj":
         # trimesh would split vertices along uv seams
-        content = read_obj(path)
-        vertices, faces = content.vertices, content.faces
+        found = _read_obj(path)
     elif path.suffix.lower() in MESH_SUFFIXES:
-        vertices, faces = _read_other(path)
+        found = _read_other(path)
     else:
         raise InputError(f"{path}: {path.suffix!r} is no mesh format; allowed: {', '.join(MESH_SUFFIXES)}")
-    check_mesh(vertices, faces, str(path))
-    return vertices, faces
+    check_mesh(found.vertices, found.faces, str(path))
+    return found
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray, name: str) -> None:
@@ -69,11 +86,21 @@ def check_mesh(vertices: np.ndarray, faces: np.ndarray, name: str) -> None:
         )
 
 
-def _read_other(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def _read_obj(path: Path) -> Surface:
+    content = read_obj(path)
+    if content.panel_vertices is None or content.layout == "flat":
+        return Surface(content.vertices, content.faces)
+    try:
+        return Surface(content.vertices, content.faces, from_content(content)[0])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _read_other(path: Path) -> Surface:
     try:
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True)
     except (ValueError, KeyError, TypeError, IndexError, NotImplementedError, OSError) as error:
         raise InputError(f"{path}: not readable as a mesh ({error})") from error
     if not isinstance(mesh, trimesh.Trimesh):
         raise InputError(f"{path}: holds no triangles; give a triangle mesh")
-    return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    return Surface(np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64))

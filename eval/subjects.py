@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from muslin.eval.meshes import MESH_SUFFIXES, read_frames
 from muslin.garments.errors import InputError
+from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset import store
 from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.sample import Sample
@@ -19,13 +20,24 @@ from muslin.sim.dataset.schema import HEADER, SAMPLES, SUFFIX
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One moving surface: positions (T, V, 3), metres; faces (F, 3); the sample it came from, if any."""
+    """One moving surface, whose topology may change over time.
+
+    positions   a frame: (V_t, 3), metres
+    faces       a frame: (F_t, 3); frames of one topology share one object
+    garments    a frame: its mesh with panels; empty where panels are not known
+    sample      what it came from, if it was one
+    """
 
     name: str
-    positions: np.ndarray
-    faces: np.ndarray
+    positions: Sequence[np.ndarray]
+    faces: Sequence[np.ndarray]
+    garments: Sequence[GarmentMesh] = ()
     fps: float | None = None
     sample: Sample | None = None
+
+    @property
+    def num_frames(self) -> int:
+        return len(self.positions)
 
 
 @dataclass(frozen=True)
@@ -63,8 +75,15 @@ def open_subject(path: str | Path, fps: float | None = None) -> Subject:
     files = [root] if root.is_file() else _mesh_files(root)
 
     def load(name: str) -> Track:
-        positions, faces = read_frames(files)
-        return Track(name, positions, faces, fps if len(files) > 1 else None)
+        frames = read_frames(files)
+        known = [frame.garment for frame in frames if frame.garment is not None]
+        return Track(
+            name,
+            [frame.vertices for frame in frames],
+            [frame.faces for frame in frames],
+            known if len(known) == len(frames) else (),
+            fps if len(files) > 1 else None,
+        )
 
     return Subject(root, (root.stem,), {root.stem: ("mesh",)}, load)
 
@@ -100,7 +119,10 @@ def _dataset(root: Path) -> Subject:
 
     def load(sample_id: str) -> Track:
         sample = dataset[sample_id]
-        return Track(sample_id, sample.positions, sample.garment.faces, sample.fps, sample)
+        frames = range(sample.num_frames)
+        garments = [sample.frame_garment(t) for t in frames]
+        positions = [sample.frame_positions(t) for t in frames]
+        return Track(sample_id, positions, [g.faces for g in garments], garments, sample.fps, sample)
 
     return Subject(root, dataset.ids, {i: _key(root, i) for i in dataset.ids}, load)
 

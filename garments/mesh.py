@@ -53,6 +53,11 @@ class GarmentMesh:
         return _boundary(self.faces)
 
     @cached_property
+    def panel_boundary_edges(self) -> NDArray[np.int32]:
+        """(B, 2) int32 edges of the panels, seams included, over panel vertices; the panel to their left."""
+        return _boundary(self.panel_faces)
+
+    @cached_property
     def boundary_loops(self) -> tuple[NDArray[np.int32], ...]:
         """Closed boundary curves of the sewn mesh (hem, neckline, cuffs), each as vertices in order."""
         following = {int(a): int(b) for a, b in self.boundary_edges}

@@ -76,12 +76,13 @@ def read_garment(
             f"{path}: faces have no uv (f v/vt); a garment needs uv, so export it with its uv map"
         )
     try:
-        return _from_muslin(content) if content.panel_vertices is not None else _from_other(content, uv_size)
+        return from_content(content) if content.panel_vertices is not None else _from_other(content, uv_size)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _from_muslin(content: ObjContent) -> tuple[GarmentMesh, NDArray[np.float64] | None]:
+def from_content(content: ObjContent) -> tuple[GarmentMesh, NDArray[np.float64] | None]:
+    """Garment and positions, as `read_garment`, of a file that this project wrote, with panel vertices."""
     assert content.panel_vertices is not None
     assert content.texture_faces is not None
     if len(content.panel_vertices) != len(content.uv):

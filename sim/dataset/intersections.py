@@ -50,6 +50,57 @@ def crossed_body_faces(
 
 
 @dataclass(frozen=True)
+class Crossings:
+    """Points (K,) in which an edge of one triangle pierces another one.
+
+    faces      (K, 2) the triangle of the edge and the one that it pierces: below the number of cloth faces of
+               the cloth, from there on of the body
+    weights    (K, 2, 3) barycentric coordinates of the point in either
+    """
+
+    faces: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+
+def find_crossings(
+    cloth_vertices: np.ndarray, cloth_faces: np.ndarray, body_vertices: np.ndarray, body_faces: np.ndarray
+) -> Crossings:
+    """All points in which the cloth crosses itself or the body, as `count_intersections` counts them.
+
+    Which pairs cross is exact, where they do is rounded. Faces of the body are numbered among those that the
+    cloth might touch.
+    """
+    scene = _scene(cloth_vertices, cloth_faces, body_vertices, body_faces)
+    pairs = _crossing_pairs(scene)
+    edges, pierced = scene.edges[pairs[:, 0]], scene.faces[pairs[:, 1]]
+    a, b, c = scene.vertices[pierced].swapaxes(0, 1)
+    p, q = scene.vertices[edges].swapaxes(0, 1)
+    normal = np.cross(b - a, c - a)
+    above, below = (np.einsum("ij,ij->i", normal, end - a) for end in (p, q))
+    rise = above - below
+    fraction = np.clip(above / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)[:, None]
+    x = p + fraction * (q - p)
+    square = np.einsum("ij,ij->i", normal, normal)
+    second = np.einsum("ij,ij->i", np.cross(x - a, c - a), normal) / square
+    third = np.einsum("ij,ij->i", np.cross(b - a, x - a), normal) / square
+    face = _face_of_edge(scene.faces, edges, len(scene.vertices))
+    on_edge = np.where(scene.faces[face] == edges[:, :1], 1.0 - fraction, 0.0)
+    on_edge += np.where(scene.faces[face] == edges[:, 1:], fraction, 0.0)
+    on_face = np.stack([1.0 - second - third, second, third], axis=1)
+    return Crossings(np.stack([face, pairs[:, 1]], axis=1), np.stack([on_edge, on_face], axis=1))
+
+
+def _face_of_edge(faces: np.ndarray, edges: np.ndarray, count: int) -> NDArray[np.int64]:
+    """(K,) one of the faces that each edge (K, 2) belongs to."""
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1) @ [count, 1]
+    order = np.argsort(sides, kind="stable")
+    return order[np.searchsorted(sides[order], np.sort(edges.astype(np.int64), axis=1) @ [count, 1])] // 3
+
+
+@dataclass(frozen=True)
 class _Scene:
     """Cloth, then body, as one mesh; of the body only the faces `kept` (M,), which the cloth might touch."""
 

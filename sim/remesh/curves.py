@@ -41,7 +41,9 @@ class Curve:
 
 def panel_boundary(mesh: GarmentMesh) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Edges (B, 2) of panel vertices that one triangle has, its panel to their left, and (B,) that face."""
-    half = np.concatenate([mesh.panel_faces[:, [0, 1]], mesh.panel_faces[:, [1, 2]], mesh.panel_faces[:, [2, 0]]])
+    half = np.concatenate(
+        [mesh.panel_faces[:, [0, 1]], mesh.panel_faces[:, [1, 2]], mesh.panel_faces[:, [2, 0]]]
+    )
     size = len(mesh.panel_vertices)
     key = half.astype(np.int64) @ np.array([size, 1])
     single = ~np.isin(key, half[:, ::-1].astype(np.int64) @ np.array([size, 1]))
@@ -135,9 +137,7 @@ def _curve(
         forward = ~forward
         ends = half[members[:, 0]][:, ::-1]
         last = sewn[members[-1, 0], 0]
-        return Curve(
-            np.append(entered, last).astype(np.int32), (ends,), (face[members[:, 0]],), (False,)
-        )
+        return Curve(np.append(entered, last).astype(np.int32), (ends,), (face[members[:, 0]],), (False,))
     tables = (half[members[:, 0]], *(half[members[:, k]][:, ::-1] for k in range(1, count)))
     last = sewn[members[-1, 0], 1]
     return Curve(

@@ -1,5 +1,4 @@
-"""Triangulations of panels whose boundaries are sampled: vertices are added until there are as many as wanted,
-and moved until the triangles are regular."""
+"""Triangulation of panels whose boundaries are sampled: vertices are added and moved until it is regular."""
 
 from __future__ import annotations
 

@@ -87,7 +87,6 @@ def clip_ears(
 
     (G. Meisters 1975, "Polygons have ears".)
     """
-    none = wp.float64(0.0)
     for k in range(first.shape[0]):
         count = length[k]
         node = first[k]
@@ -135,10 +134,9 @@ def make_delaunay(mesh: PanelMesh, passes: int) -> int:
     for _ in range(passes):
         flips = int(0)
         for h in range(3 * mesh.size[1]):
-            if mesh.corner[h] != DEAD and h < mesh.twin[h]:
-                if is_illegal(mesh, h) and can_flip(mesh, h):
-                    flip(mesh, h)
-                    flips += 1
+            if mesh.corner[h] != DEAD and h < mesh.twin[h] and is_illegal(mesh, h) and can_flip(mesh, h):
+                flip(mesh, h)
+                flips += 1
         total += flips
         if flips == 0:
             break

@@ -15,7 +15,7 @@ ROUNDS = wp.constant(6)  # of that search, each with half the reach of the one b
 
 @wp.func
 def quality(a: wp.vec2d, b: wp.vec2d, c: wp.vec2d, m: wp.mat22d) -> wp.float64:
-    """4 sqrt(3) |f| / (l_1^2 + l_2^2 + l_3^2) in the metric m: 1 for equilateral, <= 0 for inverted triangles.
+    """4 sqrt(3) |f| / (l_1^2 + l_2^2 + l_3^2) in the metric m: 1 for equilateral, <= 0 for inverted faces.
 
     (R. Bank and R. Smith 1997, "Mesh smoothing using a posteriori error estimates".)
     """
@@ -122,8 +122,8 @@ def search_better(mesh: PanelMesh, v: int, best: wp.float64):
 def mend(mesh: PanelMesh, sweeps: int, enough: wp.float64, bad: wp.array(dtype=wp.int32)):
     """Moves interior vertices of faces of a quality below `enough` to where their worst face is best.
 
-    A pattern search: eight directions around the vertex, the reach halved ROUNDS times; after each sweep, flips.
-    bad[0] is the number of vertices found so in the last sweep.
+    A pattern search: eight directions around the vertex, the reach halved ROUNDS times; after each sweep,
+    flips. bad[0] is the number of vertices found so in the last sweep.
     """
     for _ in range(sweeps):
         bad[0] = 0

@@ -125,9 +125,7 @@ class _Builder:
         self.rings: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
         self.count = self.sewn = 0
 
-    def add(
-        self, curve: Curve, place: NDArray[np.float64], sampled: list[NDArray[np.float64]]
-    ) -> None:
+    def add(self, curve: Curve, place: NDArray[np.float64], sampled: list[NDArray[np.float64]]) -> None:
         """Adds the samples of one curve on each of its sides."""
         edge = np.minimum(place.astype(np.int64), len(curve.sides[0]) - 1)
         fraction = place - edge

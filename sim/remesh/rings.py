@@ -34,8 +34,8 @@ def rings(points: NDArray[np.float64], after: NDArray[np.int32], panel: NDArray[
     """Rings of the boundary points (R, 2), metres, of panels (R,), each followed by after[r].
 
     Loops that run clockwise are holes of the loop of their panel that contains them; each is joined by a
-    bridge, run through in both directions, to the nearest point that it can be seen from. InputError if a hole
-    has nothing around it.
+    bridge, run through in both directions, to the nearest point that it can be seen from. InputError if a
+    hole has nothing around it.
     """
     count = len(after)
     graph = coo_matrix((np.ones(count, dtype=np.int8), (np.arange(count), after)), shape=(count, count))
@@ -74,7 +74,7 @@ def _bridge(
     around: NDArray[np.int64],
     panel: NDArray[np.int32],
 ) -> tuple[int, int]:
-    """Nodes of a hole and of a ring around it, the nearest two between which no boundary of the panel lies."""
+    """Nodes of a hole and of a ring around it: the nearest two with no boundary of the panel between them."""
     gap = np.linalg.norm(points[vertex[inside]][:, None] - points[vertex[around]], axis=2)
     tails = np.flatnonzero(panel[vertex] == panel[vertex[inside[0]]])
     p, q = points[vertex[tails]], points[vertex[after[tails]]]
@@ -90,9 +90,7 @@ def _bridge(
     raise InputError("a panel has a hole that no boundary surrounds; boundaries must not cross themselves")
 
 
-def _side(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _side(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
     """Which side of a-b each c lies on: twice the signed area of the triangle."""
     u, v = b - a, c - a
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

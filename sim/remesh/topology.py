@@ -117,8 +117,8 @@ def _metric(
     wanted = (len(mesh.panel_vertices), 2, 2)
     if metric.shape != wanted or not np.isfinite(metric).all() or not (area_density(metric) > 0.0).all():
         raise InputError(
-            f"sizing field of shape {metric.shape}: must be finite, positive definite metrics of shape {wanted}, "
-            "one a panel vertex"
+            f"sizing field of shape {metric.shape}: must be finite, positive definite metrics of "
+            f"shape {wanted}, one a panel vertex"
         )
     return metric
 

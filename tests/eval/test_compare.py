@@ -126,7 +126,8 @@ def test_few_surface_frames_are_said(tmp_path, make_sample):
 
 def test_obj_reader_keeps_seam_vertices_and_fans_polygons(tmp_path):
     text = QUAD + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 0.5 0.5\nv 9 9 9\nf 1/1 2/2 3/3 4/4\nf -1/5 -2/5 -3/5\n"
-    vertices, faces = read_mesh(write(tmp_path / "q.obj", text))
+    read = read_mesh(write(tmp_path / "q.obj", text))
+    vertices, faces = read.vertices, read.faces
     assert vertices.shape == (5, 3)
     assert faces.tolist() == [[0, 1, 2], [0, 2, 3], [4, 3, 2]]
 
@@ -134,7 +135,8 @@ def test_obj_reader_keeps_seam_vertices_and_fans_polygons(tmp_path):
 def test_ply_round_trip(tmp_path):
     ball = trimesh.creation.icosphere(1)
     ball.export(tmp_path / "b.ply")
-    vertices, faces = read_mesh(tmp_path / "b.ply")
+    read = read_mesh(tmp_path / "b.ply")
+    vertices, faces = read.vertices, read.faces
     assert np.array_equal(faces, ball.faces)
     assert vertices == pytest.approx(np.array(ball.vertices), abs=1e-6)
 
