@@ -33,8 +33,8 @@ def untangle(
 
     Larger triangles cut corners, and so cut through what the source lies on. Where the new surface crosses
     something, at the point x = sum_k w_k x_k of one of its triangles, it is drawn to where the source has
-    that point of panel space, y, and CLEARANCE c from the other layer along their normal n there (half of it each,
-    if both are cloth), by the least move that does so,
+    that point of panel space, y, and CLEARANCE c from the other layer along their normal n there (half of it
+    each, if both are cloth), by the least move that does so,
 
         x_k += w_k / (w . w) (y + c n - x),
 
