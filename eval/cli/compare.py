@@ -30,7 +30,8 @@ def evaluate(
     """Score a prediction: vertex, velocity and surface errors, and how much is inside the body.
 
     Either side is a dataset, one sample (DIR/samples/ID.zarr), a mesh file (.obj, .ply, .glb, .stl, .off) or
-    a folder of mesh files. Meshes of different topology get surface distances only.
+    a folder of mesh files; their topology may change from frame to frame. Meshes of different topology get
+    vertex and velocity errors if both tell panel space and are of one pattern, else surface distances only.
 
     \b
     Examples:
