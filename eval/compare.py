@@ -27,8 +27,8 @@ MM = 1000.0
 SURFACE_FRAMES = 24
 ONE_FRAME = "velocity errors are null: one frame only"
 BY_PANEL_SPACE = (
-    "topologies differ: vertex and velocity errors are of the truth's vertices against the points of the "
-    "prediction with the same panel-space coordinates"
+    "where topologies differ, vertex and velocity errors are those of the truth's vertices against points of "
+    "the prediction with the same panel-space coordinates"
 )
 
 Progress = Callable[[float, int, str], None]
