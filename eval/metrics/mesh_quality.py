@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from muslin.eval.metrics.hausdorff import hausdorff
 from muslin.eval.metrics.panel_curves import (
-    boundary_angles,
     curve_distances,
     curve_length_errors,
     mismatched_seam_vertices,
@@ -21,12 +20,12 @@ from muslin.eval.metrics.triangle_quality import (
     degenerate_and_inverted,
     distortion,
 )
+from muslin.garments.boundary_angles import boundary_angles, corners_at
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 
 SHARP = np.radians(20.0)
 GOOD = np.radians(30.0)
-ON_CORNER = 1e-6  # metres
 
 
 @dataclass(frozen=True)
@@ -127,12 +126,8 @@ def forced_corners(
     panel, so that a mesh whose own boundary went wrong is not excused.
     """
     given = mesh if source is None else source
-    forced = np.flatnonzero(boundary_angles(given) < threshold)
-    excused = np.zeros(len(mesh.panel_vertices), dtype=bool)
-    for corner in forced:
-        near = np.linalg.norm(mesh.panel_vertices - given.panel_vertices[corner], axis=1) <= ON_CORNER
-        excused |= near & (mesh.panel_vertex_panel == given.panel_vertex_panel[corner])
-    return excused[mesh.panel_faces]
+    confined = boundary_angles(given, angles(given.panel_vertices, given.panel_faces))
+    return corners_at(mesh, given, confined < threshold)
 
 
 def panel_area_errors(mesh: GarmentMesh, source: GarmentMesh) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.eval.metrics.triangle_quality import angles
+from muslin.garments.boundary_angles import boundary_angles
 from muslin.garments.mesh import GarmentMesh
 
 TURN = np.radians(60.0)  # of a boundary at a corner; curves of coarse meshes turn by up to 45 degrees
@@ -45,19 +46,6 @@ def unsewn(mesh: GarmentMesh) -> GarmentMesh:
     )
 
 
-def boundary_angles(mesh: GarmentMesh) -> NDArray[np.float64]:
-    """Interior angle of the panel's boundary at each panel vertex, radians: beta_v = sum of the angles of the
-    triangles at v; (P,), infinite for vertices inside a panel, which no boundary confines."""
-    total = np.bincount(
-        mesh.panel_faces.ravel(),
-        weights=angles(mesh.panel_vertices, mesh.panel_faces).ravel(),
-        minlength=len(mesh.panel_vertices),
-    )
-    on_boundary = np.zeros(len(total), dtype=bool)
-    on_boundary[unsewn(mesh).boundary_edges] = True
-    return np.where(on_boundary, total, np.inf)
-
-
 def pattern_corners(mesh: GarmentMesh) -> NDArray[np.bool_]:
     """(P,) whether a panel vertex is a pattern corner.
 
@@ -77,7 +65,7 @@ def pattern_corners(mesh: GarmentMesh) -> NDArray[np.bool_]:
     meet = edges[before, 0] == edges[after, 1]
     goes_on = (before >= 0) & (after >= 0) & meet & (edges[after, 1] != edges[:, 0])
     goes_on |= (before < 0) & (after < 0)
-    turn = np.abs(np.pi - boundary_angles(mesh)[edges[:, 0]])
+    turn = np.abs(np.pi - boundary_angles(mesh, angles(mesh.panel_vertices, mesh.panel_faces))[edges[:, 0]])
     corner = edges[~goes_on | (turn >= TURN), 0]
     sewn = np.zeros(mesh.num_vertices, dtype=bool)
     sewn[mesh.panel_to_vertex[corner]] = True

@@ -23,10 +23,9 @@ COARSENING = 1.5
 """Splitting begins with the longest edges and goes on to ones so much shorter each time, so that vertices
 spread evenly before there are many of them."""
 
-BALANCES, SWEEPS, FINAL_SWEEPS, MENDS = 3, 2, 12, 10
-GOOD = 0.7
-"""Quality (`relax.quality`) below which triangles are mended one by one: an isosceles triangle whose smallest
-angle is 33 degrees has it."""
+BALANCES, SWEEPS, FINAL_SWEEPS = 3, 2, 12
+MENDS, MEND_SWEEPS = 4, 10
+"""How often the metric is asked for again while bad triangles are mended, and sweeps in between."""
 
 Metric = Callable[[NDArray[np.float64], NDArray[np.int32]], NDArray[np.float64]]
 """Metric (N, 2, 2) at points (N, 2) of panels (N,)."""
@@ -47,12 +46,15 @@ def fill(
     boundary: Rings,
     wanted: NDArray[np.int64],
     metric: Metric,
+    enough: float,
     rng: np.random.Generator,
 ) -> Filling:
     """Triangles within the boundary (R, 2), of panels (R,), that the rings make of it; it stays as it is.
 
     wanted: interior vertices of each panel; they are reached exactly, where edges as long as LONGEST allow.
-    metric: asked again whenever vertices have moved. Raises InputError if a boundary crosses itself.
+    metric: asked again whenever vertices have moved.
+    enough: quality (`relax.quality`) below which triangles are mended one by one.
+    Raises InputError if a boundary crosses itself.
     """
     mesh = _rim_only(rim, metric(rim, panel), int(wanted.sum()))
     _clip(mesh, boundary)
@@ -70,7 +72,7 @@ def fill(
         table.split(0.5 * (1.0 + LONGEST))
         table.relax(SWEEPS)
     table.relax(FINAL_SWEEPS)
-    table.mend()
+    table.mend(enough)
     return _compacted(mesh, len(rim))
 
 
@@ -99,9 +101,13 @@ class _Table:
         wp.launch(relax.relax, 1, inputs=[self.mesh, sweeps], device="cpu")
         self._measure()
 
-    def mend(self) -> None:
-        inputs = [self.mesh, MENDS, wp.float64(GOOD), _int32([0])]
-        wp.launch(relax.mend, 1, inputs=inputs, device="cpu")
+    def mend(self, enough: float) -> None:
+        for _ in range(MENDS):
+            bad = _int32([0])
+            wp.launch(relax.mend, 1, inputs=[self.mesh, MEND_SWEEPS, wp.float64(enough), bad], device="cpu")
+            if bad.numpy()[0] == 0:
+                break
+            self._measure()
 
     def _order(self) -> wp.array:
         """Half-edges in an order drawn at random: which vertices come where depends on the seed alone."""

@@ -123,16 +123,18 @@ def mend(mesh: PanelMesh, sweeps: int, enough: wp.float64, bad: wp.array(dtype=w
     """Moves interior vertices of faces of a quality below `enough` to where their worst face is best.
 
     A pattern search: eight directions around the vertex, the reach halved ROUNDS times; after each sweep,
-    flips. bad[0] is the number of vertices found so in the last sweep.
+    flips. bad[0] is the number of vertices found so in the first sweep: none if nothing has moved.
     """
-    for _ in range(sweeps):
-        bad[0] = 0
+    for sweep in range(sweeps):
+        found = int(0)
         for v in range(mesh.size[0]):
             if mesh.on_rim[v] == 0 and mesh.leaving[v] >= 0:
                 best = worst_quality(mesh, v, mesh.point[v])
                 if best < enough:
-                    bad[0] += 1
+                    found += 1
                     search_better(mesh, v, best)
-        if bad[0] == 0:
+        if sweep == 0:
+            bad[0] = found
+        if found == 0:
             break
         make_delaunay(mesh, FLIP_PASSES)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
+from muslin.sim.remesh.distortion import EQUILATERAL, distortion, forced, least_quality
 from muslin.sim.remesh.field import Field
 from muslin.sim.remesh.fill import Filling, fill
 from muslin.sim.remesh.metric import area_density, uniform
@@ -17,8 +18,15 @@ from muslin.sim.remesh.panel_space import PanelSpace
 from muslin.sim.remesh.rim import Rim, sample_rim
 from muslin.sim.remesh.rings import rings
 
-EQUILATERAL = np.sqrt(3.0) / 4.0  # area of a triangle whose sides are 1
 JITTER = 0.2  # of the edge length: how far boundary vertices move along their curve at random
+
+MAX_DISTORTION = 2.5
+MENDED = 2.2
+"""Distortion above which triangles are mended where more is allowed: uniform targets reach it
+nearly everywhere (`docs/remeshing.md`)."""
+
+ATTEMPTS = 3
+"""Triangulations drawn before a distortion counts as out of reach."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +70,7 @@ def remesh(
     target: float | Mapping[str, float] | NDArray[np.float64],
     *,
     seed: int = 0,
+    max_distortion: float = MAX_DISTORTION,
 ) -> Remeshed:
     """Another triangulation of the same garment in the same drape (phi of the thesis).
 
@@ -76,13 +85,44 @@ def remesh(
     are added, moved and joined until edges are as long as the metric says and triangles are regular (`fill`).
     Positions, uv and what is carried are the source's at the same place in panel space.
 
-    Raises InputError for targets that are not positive or too large for a panel.
+    max_distortion: the largest distortion of a triangle in the metric (`distortion`), 1 if all were
+    equilateral; triangles in corners that the pattern makes sharper than that allows are left out (`forced`).
+
+    Raises InputError for targets that are not positive or too large for a panel, and for a max_distortion
+    that is not reached in ATTEMPTS draws.
     """
+    if not max_distortion > 1.0:
+        raise InputError(f"max_distortion = {max_distortion:g}: must be more than 1, which is equilateral")
     metric = _metric(mesh, target)
+    space = PanelSpace(mesh)
     rng = np.random.default_rng(seed)
+    enough = least_quality(min(max_distortion, MENDED))
+    reached = np.inf
+    for _ in range(ATTEMPTS):
+        found, field = _draw(mesh, positions, metric, space, enough, rng)
+        local = field.at(found.mesh.panel_vertices, found.mesh.panel_vertex_panel)
+        shape = distortion(found.mesh, local)
+        worst = float(shape.max(where=~forced(found.mesh, mesh, metric, max_distortion), initial=1.0))
+        if worst <= max_distortion:
+            return found
+        reached = min(reached, worst)
+    raise InputError(
+        f"max_distortion = {max_distortion:g} is out of reach: the best of {ATTEMPTS} triangulations has "
+        f"{reached:.2f}; allow more, choose smaller triangles or another seed"
+    )
+
+
+def _draw(
+    mesh: GarmentMesh,
+    positions: NDArray[np.float64],
+    metric: NDArray[np.float64],
+    space: PanelSpace,
+    enough: float,
+    rng: np.random.Generator,
+) -> tuple[Remeshed, Field]:
+    """One triangulation, and the metric that it follows."""
     rim = sample_rim(mesh, metric, rng, JITTER)
     panel = mesh.face_panel[rim.face]
-    space = PanelSpace(mesh)
     field = Field(mesh, metric, space, space.lift(rim.points, panel), rim.spacing)
     boundary = rings(rim.points, rim.after, panel)
     faces_wanted = np.bincount(
@@ -91,8 +131,8 @@ def remesh(
     # F = 2 I + B - 2 of a disk with I vertices inside and B on its boundary; a hole adds 2.
     nodes = np.bincount(boundary.panel, boundary.length - 2.0, minlength=len(mesh.panel_names))
     wanted = np.maximum(np.round(0.5 * (faces_wanted - nodes)), 0.0).astype(np.int64)
-    filling = fill(rim.points, panel, boundary, wanted, field.at, rng)
-    return _sewn(mesh, np.asarray(positions, dtype=np.float64), space, rim, filling)
+    filling = fill(rim.points, panel, boundary, wanted, field.at, enough, rng)
+    return _sewn(mesh, np.asarray(positions, dtype=np.float64), space, rim, filling), field
 
 
 def _metric(
