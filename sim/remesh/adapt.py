@@ -1,0 +1,153 @@
+"""Adaptive remeshing of a garment in motion: as few edges as keep all of them within size 1."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from muslin.garments.errors import InputError
+from muslin.sim.remesh.changes import collapse_if_fine, flip_if_better, size_squared, split_edge
+from muslin.sim.remesh.metric import area_density
+from muslin.sim.remesh.panel_mesh import DEAD, head
+from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload
+from muslin.sim.remesh.surroundings import Surroundings, Tree
+
+wp.set_module_options({"enable_backward": False})
+
+EQUILATERAL = np.sqrt(3.0) / 4.0
+SPARE = 3.0
+"""Room for so many times the vertices that the metric asks for: bisected edges are 0.7 long in the mean, so
+there are twice as many as of unit edges."""
+
+MOST_VERTICES = 2_000_000
+"""Room beyond which a sizing field is taken for an error."""
+
+FLIPS, ROUNDS, COLLAPSES = 4, 30, 6
+"""Most passes of flips after one of splits or collapses; of splits; of collapses."""
+
+
+@dataclass(frozen=True)
+class Changes:
+    """How often edges were split, flipped and collapsed."""
+
+    splits: int
+    flips: int
+    collapses: int
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.splits + self.flips + self.collapses
+
+
+@wp.func
+def flip_all(mesh: SewnMesh, around: Surroundings, made: wp.array(dtype=wp.int32)):
+    """Passes of flips over all edges, FLIPS at most, until none is made."""
+    panels = mesh.panels
+    for _ in range(FLIPS):
+        before = made[1]
+        for h in range(3 * panels.size[1]):
+            if panels.corner[h] != DEAD and h < panels.twin[h] and flip_if_better(mesh, around, h):
+                made[1] += 1
+        if made[1] == before:
+            break
+
+
+@wp.kernel
+def adapt_kernel(
+    mesh: SewnMesh, around: Surroundings, least_quality: wp.float64, made: wp.array(dtype=wp.int32)
+):
+    """Flips, splits of edges of size > 1, the worst first, and collapses, as the module says.
+
+    made: splits, flips, collapses, and 1 if the table was full before all edges were short enough.
+    """
+    panels = mesh.panels
+    flip_all(mesh, around, made)
+    limit = wp.float64(4.0)
+    one = wp.float64(1.0)
+    for _ in range(ROUNDS):
+        before = made[0]
+        for h in range(3 * panels.size[1]):
+            # Each edge once: a hem by its only half-edge, a seam by the lower one of its two.
+            t = panels.twin[h]
+            if panels.corner[h] != DEAD and t < h and (t >= -1 or -2 - t < h):
+                if size_squared(mesh, h) > limit * limit:
+                    v = mesh.vertex[panels.corner[h]]
+                    w = mesh.vertex[head(panels, h)]
+                    if mesh.locked[v] != PINNED or mesh.locked[w] != PINNED:
+                        if not split_edge(mesh, h):
+                            made[3] = 1
+                            return
+                        made[0] += 1
+        if made[0] > before:
+            flip_all(mesh, around, made)
+        elif limit <= one:
+            break
+        else:
+            limit = wp.max(limit * wp.float64(0.7), one)
+    for _ in range(COLLAPSES):
+        before = made[2]
+        for h in range(3 * panels.size[1]):
+            t = panels.twin[h]
+            if panels.corner[h] != DEAD and t < h and (t >= -1 or -2 - t < h):
+                if size_squared(mesh, h) < wp.float64(0.64):
+                    tail = panels.corner[h]
+                    tip = head(panels, h)
+                    if collapse_if_fine(mesh, around, h, tail, least_quality) or collapse_if_fine(
+                        mesh, around, h, tip, least_quality
+                    ):
+                        made[2] += 1
+        if made[2] == before:
+            break
+        flip_all(mesh, around, made)
+
+
+def adapt(
+    state: GarmentState,
+    metric: NDArray[np.float64],
+    body_vertices: NDArray[np.float64],
+    body_faces: NDArray[np.int32],
+    aspect_min: float = 0.2,
+) -> tuple[GarmentState, Changes]:
+    """The garment remeshed so that no edge is longer than 1 in the metric (P, 2, 2), 1/m^2.
+
+    Edges that violate the Delaunay criterion of the metric are flipped; edges of size > 1 are split; then
+    edges are collapsed as long as the new ones stay within 0.9 and triangles of a fair shape. Splits leave
+    the surface as it is; flips and collapses, which change it, are made where they keep clear of the cloth
+    and the body (N, 3), (M, 3). Panel space, mass and linear momentum stay; so do corners, curved boundaries
+    and what is locked.
+
+    Raises InputError if the metric asks for more vertices than make sense.
+    """
+    mesh = state.mesh
+    density = mesh.face_areas * area_density(metric[mesh.panel_faces].mean(axis=1))
+    asked = 0.5 * float(density.sum()) / EQUILATERAL
+    room = int(SPARE * max(asked, len(mesh.panel_vertices))) + 256
+    if room > MOST_VERTICES:
+        raise InputError(
+            f"remesh: the sizing field asks for some {asked:.3g} vertices; allowed are {MOST_VERTICES / SPARE:g}: "
+            "raise size_min or the refine_ keys"
+        )
+    sewn = load(state, metric, room)
+    around = Surroundings()
+    tree, body_tree = Tree(state.positions, mesh.faces), Tree(body_vertices, body_faces)
+    around.x = wp.array(state.positions, dtype=wp.vec3d, device="cpu")
+    around.faces = wp.array(mesh.faces, dtype=wp.int32, device="cpu")
+    around.point = wp.array(mesh.panel_vertices, dtype=wp.vec2d, device="cpu")
+    around.panel_faces = wp.array(mesh.panel_faces, dtype=wp.int32, device="cpu")
+    around.panel = wp.array(mesh.face_panel, dtype=wp.int32, device="cpu")
+    around.tree = tree.id
+    around.body_x = wp.array(body_vertices, dtype=wp.vec3d, device="cpu")
+    around.body_faces = wp.array(body_faces.reshape(-1, 3), dtype=wp.int32, device="cpu")
+    around.body_tree = body_tree.id
+    made = wp.zeros(4, dtype=wp.int32, device="cpu")
+    # An isosceles triangle of that height over its base has about this quality.
+    inputs = [sewn, around, wp.float64(aspect_min), made]
+    wp.launch(adapt_kernel, 1, inputs=inputs, device="cpu")
+    splits, flips, collapses, full = made.numpy().tolist()
+    if full:
+        raise InputError(
+            f"remesh: more than {room} vertices are not enough for the sizing field; raise size_min"
+        )
+    return unload(sewn, state), Changes(splits, flips, collapses)
