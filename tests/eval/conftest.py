@@ -6,6 +6,7 @@ import trimesh
 
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.remeshed import sample_of_frames
 from muslin.sim.dataset.sample import Sample
 
 SIDE = 0.8
@@ -66,3 +67,25 @@ def make_sample():
         return Sample(**(values | changes)).validate()
 
     return make
+
+
+@pytest.fixture
+def remeshed_sample():
+    """A level sheet over the sphere that rises 1 cm a frame, on another mesh from frame 2 on."""
+    meshes = [square(n) for n in (7, 12)]
+    frames = []
+    for t, mesh in enumerate(chosen := [meshes[0], meshes[0], meshes[1]]):
+        grid = mesh.panel_vertices - SIDE / 2
+        frames.append(np.stack([grid[:, 0], np.full(len(grid), 0.21 + 0.01 * t), -grid[:, 1]], axis=1))
+    ball = trimesh.creation.icosphere(3, SPHERE_RADIUS)
+    return sample_of_frames(
+        chosen,
+        frames,
+        id="remeshed",
+        kind="sequence",
+        certificate=Certificate(cloth_cloth_intersections=0, cloth_body_intersections=0),
+        fps=30.0,
+        obstacle_vertices=np.array(ball.vertices, dtype=np.float32)[None],
+        obstacle_faces=np.array(ball.faces, dtype=np.int32),
+        labels={"design": "square", "sequence": "rise"},
+    ).validate()

@@ -303,3 +303,27 @@ def test_violated_expectations_are_listed_with_exit_code_one(tmp_path, make_samp
     assert "expect.smallest_distance: measured 0.01 m, allowed is at least 0.02 m" in result.stderr
     assert "frames:" not in result.stderr
     assert len(open_dataset(tmp_path / "out")) == 1, "what was computed is kept, to be looked at"
+
+
+def test_every_command_takes_a_sequence_whose_topology_changes(tmp_path, remeshed_sample, make_sample):
+    data = write_dataset(tmp_path / "data", [remeshed_sample]).root
+    facts = json.loads(muslin("info", data, "--json").output)
+    assert (facts["remeshed"], facts["frames"], facts["vertices"]) == (1, 3, [144, 144])
+    muslin("verify", data, "--json", tmp_path / "v.json", "--workers", 1)
+    assert json.loads((tmp_path / "v.json").read_text())["frames"] == 3
+    for name in ("last.png", "film.gif"):
+        muslin(
+            "render", data, "--sample", "remeshed", "--frame", 2, "--size", "64x64", "--out", tmp_path / name
+        )
+    assert Image.open(tmp_path / "film.gif").n_frames == 2  # thinned to 15 a second
+    muslin("report", data, "--html", tmp_path / "r.html", "--workers", 1)
+    assert (tmp_path / "r.html").read_text().count("data:image/gif") == 1
+    muslin("export", data, "--format", "obj", "--out", tmp_path / "obj")
+    sizes = [len(trimesh.load(f, process=False).vertices) for f in sorted(tmp_path.glob("obj/*/cloth_*.obj"))]
+    assert sizes == [49, 49, 144]
+    refused("export", data, "--format", "pc2", "--out", tmp_path / "x", says="export it as usd")
+    write_dataset(tmp_path / "fixed", [make_sample("remeshed", frames=3, height=0.24)])
+    muslin("eval", data, tmp_path / "fixed", "--json", tmp_path / "e.json", "--html", tmp_path / "e.html")
+    found = json.loads((tmp_path / "e.json").read_text())
+    assert found["vertex_error_mm"]["max"] == pytest.approx(30.0, abs=1e-3)
+    assert found["velocity_error_mm_s"]["max"] < 0.01

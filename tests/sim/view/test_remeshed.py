@@ -63,7 +63,7 @@ def test_one_surface_looks_the_same_on_every_mesh(sample: Sample) -> None:
     blue = [(f[..., 2].astype(int) - f[..., 0] > 25) for f in frames]  # the cloth, on a grey ground
     assert blue[0].sum() > 500
     for other in blue[1:]:
-        assert (blue[0] != other).mean() < 0.02
+        assert (blue[0] != other).sum() < 0.01 * blue[0].sum()
     alone = picture(sample, 2, SIZE, quality=COARSE)
     assert np.abs(alone.astype(int) - frames[2]).mean() < 20
 
