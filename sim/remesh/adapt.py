@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from muslin.garments.errors import InputError
 from muslin.sim.remesh.changes import collapse_if_fine, flip_if_better, size_squared, split_edge
 from muslin.sim.remesh.metric import area_density
-from muslin.sim.remesh.panel_mesh import DEAD, head
-from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload
+from muslin.sim.remesh.panel_mesh import DEAD, PanelMesh, apex, head
+from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload, was_refused
 from muslin.sim.remesh.surroundings import Surroundings, Tree
 
 wp.set_module_options({"enable_backward": False})
@@ -19,6 +19,8 @@ EQUILATERAL = np.sqrt(3.0) / 4.0
 SPARE = 3.0
 """Room for so many times the vertices that the metric asks for: bisected edges are 0.7 long in the mean, so
 there are twice as many as of unit edges."""
+
+SHORT = wp.constant(wp.float64(0.8))  # size of the edges that are looked at for collapse
 
 MOST_VERTICES = 2_000_000
 """Room beyond which a sizing field is taken for an error."""
@@ -42,44 +44,83 @@ class Changes:
 
 
 @wp.func
+def is_edge(panels: PanelMesh, h: int) -> bool:
+    """Whether h stands for its edge: each edge is once, a hem by its only half-edge, others by one of two."""
+    t = panels.twin[h]
+    return panels.corner[h] != DEAD and t < h and (t >= -1 or -2 - t < h)
+
+
+@wp.func
 def flip_all(mesh: SewnMesh, around: Surroundings, made: wp.array(dtype=wp.int32)):
     """Passes of flips over all edges, FLIPS at most, until none is made."""
     panels = mesh.panels
     for _ in range(FLIPS):
-        before = made[1]
+        before = int(made[1])
         for h in range(3 * panels.size[1]):
-            if panels.corner[h] != DEAD and h < panels.twin[h] and flip_if_better(mesh, around, h):
-                made[1] += 1
+            t = panels.twin[h]
+            if panels.corner[h] != DEAD and t >= 0 and t < h:
+                v = mesh.vertex[panels.corner[h]]
+                w = mesh.vertex[head(panels, h)]
+                again = was_refused(mesh, h, 0, v, w)
+                if again:
+                    again = was_refused(mesh, h, 0, mesh.vertex[apex(panels, h)], mesh.vertex[apex(panels, t)])
+                if not again:
+                    if flip_if_better(mesh, around, h):
+                        made[1] += 1
+                    else:
+                        mesh.refused[h, 0] = mesh.clock[0]
         if made[1] == before:
             break
+
+
+@wp.func
+def split_long(mesh: SewnMesh, limit: wp.float64, made: wp.array(dtype=wp.int32)):
+    """A pass over all edges that splits those of size > limit; made[3] is set where there is no more room."""
+    panels = mesh.panels
+    for h in range(3 * panels.size[1]):
+        if is_edge(panels, h) and made[3] == 0 and size_squared(mesh, h) > limit * limit:
+            v = mesh.vertex[panels.corner[h]]
+            w = mesh.vertex[head(panels, h)]
+            if mesh.locked[v] != PINNED or mesh.locked[w] != PINNED:
+                if split_edge(mesh, h):
+                    made[0] += 1
+                else:
+                    made[3] = 1
+
+
+@wp.func
+def collapse_short(
+    mesh: SewnMesh, around: Surroundings, least: wp.float64, made: wp.array(dtype=wp.int32)
+):
+    """A pass over all edges that collapses those that may be."""
+    panels = mesh.panels
+    for h in range(3 * panels.size[1]):
+        if is_edge(panels, h) and size_squared(mesh, h) < SHORT * SHORT:
+            tail = panels.corner[h]
+            tip = head(panels, h)
+            if not was_refused(mesh, h, 1, mesh.vertex[tail], mesh.vertex[tip]):
+                if collapse_if_fine(mesh, around, h, tail, least):
+                    made[2] += 1
+                elif collapse_if_fine(mesh, around, h, tip, least):
+                    made[2] += 1
+                else:
+                    mesh.refused[h, 1] = mesh.clock[0]
 
 
 @wp.kernel
 def adapt_kernel(
     mesh: SewnMesh, around: Surroundings, least_quality: wp.float64, made: wp.array(dtype=wp.int32)
 ):
-    """Flips, splits of edges of size > 1, the worst first, and collapses, as the module says.
+    """Flips, splits of edges of size > 1, the worst first, and collapses.
 
     made: splits, flips, collapses, and 1 if the table was full before all edges were short enough.
     """
-    panels = mesh.panels
     flip_all(mesh, around, made)
     limit = wp.float64(4.0)
     one = wp.float64(1.0)
     for _ in range(ROUNDS):
-        before = made[0]
-        for h in range(3 * panels.size[1]):
-            # Each edge once: a hem by its only half-edge, a seam by the lower one of its two.
-            t = panels.twin[h]
-            if panels.corner[h] != DEAD and t < h and (t >= -1 or -2 - t < h):
-                if size_squared(mesh, h) > limit * limit:
-                    v = mesh.vertex[panels.corner[h]]
-                    w = mesh.vertex[head(panels, h)]
-                    if mesh.locked[v] != PINNED or mesh.locked[w] != PINNED:
-                        if not split_edge(mesh, h):
-                            made[3] = 1
-                            return
-                        made[0] += 1
+        before = int(made[0])
+        split_long(mesh, limit, made)
         if made[0] > before:
             flip_all(mesh, around, made)
         elif limit <= one:
@@ -87,17 +128,8 @@ def adapt_kernel(
         else:
             limit = wp.max(limit * wp.float64(0.7), one)
     for _ in range(COLLAPSES):
-        before = made[2]
-        for h in range(3 * panels.size[1]):
-            t = panels.twin[h]
-            if panels.corner[h] != DEAD and t < h and (t >= -1 or -2 - t < h):
-                if size_squared(mesh, h) < wp.float64(0.64):
-                    tail = panels.corner[h]
-                    tip = head(panels, h)
-                    if collapse_if_fine(mesh, around, h, tail, least_quality) or collapse_if_fine(
-                        mesh, around, h, tip, least_quality
-                    ):
-                        made[2] += 1
+        before = int(made[2])
+        collapse_short(mesh, around, least_quality, made)
         if made[2] == before:
             break
         flip_all(mesh, around, made)

@@ -30,6 +30,7 @@ from muslin.sim.remesh.sewn_mesh import (
     are_joined,
     drop_sewn_vertex,
     new_sewn_vertex,
+    touch,
 )
 from muslin.sim.remesh.surroundings import Place, Surroundings, is_clear, pierces, turns_little
 
@@ -113,8 +114,16 @@ def split_edge(mesh: SewnMesh, h: int) -> bool:
     share_split(mesh, h, m)
     if t >= 0:
         share_split(mesh, t, m)
+    mesh.clock[0] += 1
+    touch(mesh, v)
+    touch(mesh, w)
+    touch(mesh, m)
+    touch(mesh, mesh.vertex[apex(panels, h)])
+    if t >= 0:
+        touch(mesh, mesh.vertex[apex(panels, t)])
     split(panels, h, p)
     if g >= 0:
+        touch(mesh, mesh.vertex[apex(panels, g)])
         put_middle(mesh, g, m, q)
         share_split(mesh, g, m)
         split(panels, g, q)
@@ -259,6 +268,11 @@ def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
     one = face_area(panels, h) * third
     other = face_area(panels, t) * third
     flip(panels, h)
+    mesh.clock[0] += 1
+    touch(mesh, va)
+    touch(mesh, vb)
+    touch(mesh, vc)
+    touch(mesh, vd)
     with_a = face_area(panels, h) * third
     with_b = face_area(panels, t) * third
     whole = one + other
@@ -422,6 +436,8 @@ def hand_over(mesh: SewnMesh, p: int, q: int) -> wp.vec3d:
         new = wp.float64(0.0)
         if i != q and j != q:
             new = doubled_area(panels.point[q], panels.point[i], panels.point[j]) * sixth
+        touch(mesh, vi)
+        touch(mesh, vj)
         mesh.area[vp] -= old
         mesh.area[vq] += new
         mesh.area[vi] += new - old
@@ -469,6 +485,8 @@ def collapse_if_fine(mesh: SewnMesh, surroundings: Surroundings, h: int, p: int,
         return False
     if g >= 0 and not fan_may_follow(mesh, surroundings, p2, q2, moved, least):
         return False
+    mesh.clock[0] += 1
+    touch(mesh, w)
     gained = hand_over(mesh, p, q)
     if g >= 0:
         gained += hand_over(mesh, p2, q2)

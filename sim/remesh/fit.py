@@ -1,4 +1,4 @@
-"""Fitting another triangulation to a drape, so that all topologies of a design describe the same deformation."""
+"""Fitting another triangulation to a drape, so that all topologies of a design describe one deformation."""
 
 from __future__ import annotations
 

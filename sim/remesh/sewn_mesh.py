@@ -30,6 +30,9 @@ class SewnMesh:
     copy        (V,) one panel vertex of each sewn vertex, -1 where it is no more
     size        (2,) sewn vertices ever used, and those of them that are spare
     spare       (V,) stack of sewn vertices that will be used again
+    clock       (1,) changes so far; changed (V,) the last of them that concerned each vertex
+    refused     (3 F, 2) changes made when the flip and the collapse of an edge were last refused: as long as
+                nothing around it changes, they would be again
     """
 
     panels: PanelMesh
@@ -45,6 +48,9 @@ class SewnMesh:
     copy: wp.array(dtype=wp.int32)
     size: wp.array(dtype=wp.int32)
     spare: wp.array(dtype=wp.int32)
+    clock: wp.array(dtype=wp.int32)
+    changed: wp.array(dtype=wp.int32)
+    refused: wp.array2d(dtype=wp.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +90,12 @@ def load(state: GarmentState, metric: NDArray[np.float64], room: int) -> SewnMes
     panels.on_rim.numpy()[tail[rim]] = 1
     per_panel_vertex = {"uv": wp.vec2d, "vertex": wp.int32, "next_copy": wp.int32, "home": wp.int32}
     per_vertex = {"x": wp.vec3d, "v": wp.vec3d, "held": wp.vec3d, "area": wp.float64}
-    per_vertex |= {"locked": wp.int32, "copy": wp.int32, "spare": wp.int32}
+    per_vertex |= {"locked": wp.int32, "copy": wp.int32, "spare": wp.int32, "changed": wp.int32}
     for name, dtype in {**per_panel_vertex, **per_vertex}.items():
         setattr(mesh, name, wp.zeros(room, dtype=dtype, device="cpu"))
     mesh.size = wp.array([size_v, 0], dtype=wp.int32, device="cpu")
+    mesh.clock = wp.zeros(1, dtype=wp.int32, device="cpu")
+    mesh.refused = wp.full((len(panels.corner), 2), -1, dtype=wp.int32, device="cpu")
     mesh.uv.numpy()[:size_p] = garment.uv
     mesh.vertex.numpy()[:size_p] = garment.panel_to_vertex
     mesh.next_copy.numpy()[:size_p] = _next_copies(garment.panel_to_vertex)
@@ -220,3 +228,16 @@ def are_joined(mesh: SewnMesh, v: int, w: int) -> bool:
         if p == mesh.copy[v]:
             return False
     return False
+
+
+@wp.func
+def touch(mesh: SewnMesh, v: int):
+    """Notes that a change concerns the sewn vertex v."""
+    mesh.changed[v] = mesh.clock[0]
+
+
+@wp.func
+def was_refused(mesh: SewnMesh, h: int, kind: int, v: int, w: int) -> bool:
+    """Whether a change of h was refused, and nothing that concerns v or w was changed since."""
+    when = mesh.refused[h, kind]
+    return when >= mesh.changed[v] and when >= mesh.changed[w]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ class Remeshed:
     source                 the mesh it was made from, of V sewn and P panel vertices
     face, weights          (P',) int64, (P', 3) float64: triangle of the source in which each panel vertex
                            lies, and its barycentric coordinates there
+    distortion             the largest of its triangles, see `remesh`
     """
 
     mesh: GarmentMesh
@@ -45,18 +47,25 @@ class Remeshed:
     source: GarmentMesh
     face: NDArray[np.int64]
     weights: NDArray[np.float64]
+    distortion: float
 
-    def carry(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values (V', …) at the new sewn vertices of a quantity (V, …) at the source's, linear in triangles:
-
-            q'_v = sum_k weights_vk q[faces[face_v, k]].
+    @cached_property
+    def at_vertices(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Vertices (V', 3) of the source's triangle in which each sewn vertex lies, and the weights (V', 3).
 
         Both sides of a seam see the same two vertices, so it does not matter which of them is asked.
         """
         one = np.zeros(self.mesh.num_vertices, dtype=np.int64)
         one[self.mesh.panel_to_vertex] = np.arange(len(self.face))
-        corners = self.source.faces[self.face[one]]
-        return np.einsum("vk,vk...->v...", self.weights[one], np.asarray(values, dtype=np.float64)[corners])
+        return self.source.faces[self.face[one]], self.weights[one]
+
+    def carry(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (V', …) at the new sewn vertices of a quantity (V, …) at the source's, linear in triangles:
+
+            q'_v = sum_k weights_vk q[faces[face_v, k]].
+        """
+        corners, weights = self.at_vertices
+        return np.einsum("vk,vk...->v...", weights, np.asarray(values, dtype=np.float64)[corners])
 
     def carry_panel(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """As `carry`, (P', …) at panel vertices of a quantity (P, …) at the source's panel vertices."""
@@ -104,7 +113,7 @@ def remesh(
         shape = distortion(found.mesh, local)
         worst = float(shape.max(where=~forced(found.mesh, mesh, metric, max_distortion), initial=1.0))
         if worst <= max_distortion:
-            return found
+            return replace(found, distortion=worst)
         reached = min(reached, worst)
     raise InputError(
         f"max_distortion = {max_distortion:g} is out of reach: the best of {ATTEMPTS} triangulations has "
@@ -190,5 +199,5 @@ def _sewn(
         parameters=dict(source.parameters),
     )
     mesh.validate()
-    bare = Remeshed(mesh, np.zeros((mesh.num_vertices, 3)), source, face, weights)
+    bare = Remeshed(mesh, np.zeros((mesh.num_vertices, 3)), source, face, weights, np.inf)
     return replace(bare, positions=bare.carry(positions))
