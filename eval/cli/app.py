@@ -15,6 +15,7 @@ from muslin.eval.cli.export import export
 from muslin.eval.cli.generate import generate
 from muslin.eval.cli.info import info
 from muslin.eval.cli.pattern import pattern
+from muslin.eval.cli.remesh import remesh
 from muslin.eval.cli.render import render
 from muslin.eval.cli.report import report
 from muslin.eval.cli.simulate import simulate
@@ -89,6 +90,7 @@ for name, command, summary in (
     ("report", report, "A dataset as one HTML page."),
     ("export", export, "Samples as OBJ, PLY, GLB, USD, PC2 or NPZ."),
     ("pattern", pattern, "A sewing pattern as file, mesh or drawing."),
+    ("remesh", remesh, "A draped garment in other triangles."),
     ("render", render, "Pictures and movies."),
     ("validate", validate, "The simulator against known solutions."),
     ("view", view, "Look at a sample in a window."),

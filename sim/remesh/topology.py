@@ -62,7 +62,7 @@ class Remeshed:
     def carry(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (V', …) at the new sewn vertices of a quantity (V, …) at the source's, linear in triangles:
 
-            q'_v = sum_k weights_vk q[faces[face_v, k]].
+        q'_v = sum_k weights_vk q[faces[face_v, k]].
         """
         corners, weights = self.at_vertices
         return np.einsum("vk,vk...->v...", weights, np.asarray(values, dtype=np.float64)[corners])

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from muslin.eval.cli.app import app
 from muslin.sim.dataset.reader import open_dataset, write_dataset
 
-COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "render", "view")
+COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "remesh", "render", "view")
 
 
 def muslin(*arguments, code: int = 0):
