@@ -73,15 +73,24 @@ def _lower_pairs(stencils: NDArray[np.int32]) -> NDArray[np.int64]:
     return np.stack([ascending[:, i] for i in np.tril_indices(stencils.shape[1], -1)], axis=2)
 
 
-def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
-    """Rest geometry of `mesh` in `fabric`; the warp runs along panel-space +y."""
+def build_cloth(
+    mesh: GarmentMesh, fabric: Fabric | Sequence[Fabric], face_fabric: NDArray[np.int32] | None = None
+) -> ClothModel:
+    """Rest geometry of `mesh` in `fabric`, or in several, `face_fabric` (F,) saying which is where; the warp
+    runs along panel-space +y."""
+    fabrics = (fabric,) if isinstance(fabric, Fabric) else tuple(fabric)
+    if face_fabric is None:
+        face_fabric = np.zeros(len(mesh.faces), np.int32)
+    density = np.array([f.density for f in fabrics])[face_fabric]
     material = mesh.panel_vertices[:, ::-1]
     corners = material[mesh.panel_faces]
     rest = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
     area = 0.5 * np.abs(np.linalg.det(rest))
     faces = mesh.faces.astype(np.int32)
     n = int(faces.max()) + 1
-    vertex_area = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=n).astype(np.float64)
+    vertex_area, mass = (
+        np.bincount(faces.ravel(), np.repeat(share / 3.0, 3), minlength=n) for share in (area, density * area)
+    )
 
     edges, _, edge_of_corner = _edges(faces)
     edge_area = np.bincount(edge_of_corner, np.tile(area / 3.0, 3), len(edges)).astype(np.float64)
@@ -93,14 +102,14 @@ def build_cloth(mesh: GarmentMesh, fabric: Fabric) -> ClothModel:
         hinges=hinges,
         inverse_rest=np.linalg.inv(rest).astype(np.float64),
         rest_area=area,
-        mass=fabric.density * vertex_area,
+        mass=mass,
         vertex_area=vertex_area,
         edge_area=edge_area,
         curvature_offsets=offsets,
         curvature_hinges=members,
         curvature_weights=weights,
-        face_fabric=np.zeros(len(faces), np.int32),
-        fabrics=(fabric,),
+        face_fabric=face_fabric,
+        fabrics=fabrics,
     )
 
 

@@ -79,10 +79,11 @@ def cut_into_patches(
 
 def _touched(sets: NDArray[np.int64], edges: NDArray[np.int32], faces: NDArray[np.int32]) -> Rows:
     """The vertices of each set, and those of its edges and faces."""
-    own = np.column_stack([sets, np.arange(len(sets))])
-    reached = [np.column_stack([sets[rows[:, 0]], ends]) for rows in (edges, faces) for ends in rows.T]
-    both = np.unique(np.concatenate([own, *reached]), axis=0)
-    return _in_order(both[:, 1:], both[:, 0], int(sets.max()) + 1)
+    count = len(sets)
+    reached = [sets[rows[:, 0]] * count + ends for rows in (edges, faces) for ends in rows.T]
+    # As numbers, which sort many times faster than rows.
+    both = np.unique(np.concatenate([sets * count + np.arange(count), *reached]))
+    return _in_order((both % count)[:, None], both // count, int(sets.max()) + 1)
 
 
 def _in_order(rows: NDArray[np.signedinteger[Any]], sets: NDArray[np.int64], count: int) -> Rows:

@@ -7,8 +7,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
-from muslin.sim.remesh.changes import collapse_if_fine, flip_if_better, size_squared, split_edge
+from muslin.sim.remesh.edge_collapse import collapse_if_fine
+from muslin.sim.remesh.edge_flip import flip_if_better
+from muslin.sim.remesh.edge_split import size_squared, split_edge
 from muslin.sim.remesh.metric import area_density
+from muslin.sim.remesh.obstacle import Obstacle
 from muslin.sim.remesh.panel_mesh import DEAD, PanelMesh, apex, head
 from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload, was_refused
 from muslin.sim.remesh.surroundings import Surroundings, Tree
@@ -63,7 +66,9 @@ def flip_all(mesh: SewnMesh, around: Surroundings, made: wp.array(dtype=wp.int32
                 w = mesh.vertex[head(panels, h)]
                 again = was_refused(mesh, h, 0, v, w)
                 if again:
-                    again = was_refused(mesh, h, 0, mesh.vertex[apex(panels, h)], mesh.vertex[apex(panels, t)])
+                    again = was_refused(
+                        mesh, h, 0, mesh.vertex[apex(panels, h)], mesh.vertex[apex(panels, t)]
+                    )
                 if not again:
                     if flip_if_better(mesh, around, h):
                         made[1] += 1
@@ -89,9 +94,7 @@ def split_long(mesh: SewnMesh, limit: wp.float64, made: wp.array(dtype=wp.int32)
 
 
 @wp.func
-def collapse_short(
-    mesh: SewnMesh, around: Surroundings, least: wp.float64, made: wp.array(dtype=wp.int32)
-):
+def collapse_short(mesh: SewnMesh, around: Surroundings, least: wp.float64, made: wp.array(dtype=wp.int32)):
     """A pass over all edges that collapses those that may be."""
     panels = mesh.panels
     for h in range(3 * panels.size[1]):
@@ -99,9 +102,9 @@ def collapse_short(
             tail = panels.corner[h]
             tip = head(panels, h)
             if not was_refused(mesh, h, 1, mesh.vertex[tail], mesh.vertex[tip]):
-                if collapse_if_fine(mesh, around, h, tail, least):
-                    made[2] += 1
-                elif collapse_if_fine(mesh, around, h, tip, least):
+                if collapse_if_fine(mesh, around, h, tail, least) or collapse_if_fine(
+                    mesh, around, h, tip, least
+                ):
                     made[2] += 1
                 else:
                     mesh.refused[h, 1] = mesh.clock[0]
@@ -138,17 +141,16 @@ def adapt_kernel(
 def adapt(
     state: GarmentState,
     metric: NDArray[np.float64],
-    body_vertices: NDArray[np.float64],
-    body_faces: NDArray[np.int32],
+    obstacle: Obstacle,
     aspect_min: float = 0.2,
-) -> tuple[GarmentState, Changes]:
+) -> tuple[GarmentState, NDArray[np.int32], Changes]:
     """The garment remeshed so that no edge is longer than 1 in the metric (P, 2, 2), 1/m^2.
 
     Edges that violate the Delaunay criterion of the metric are flipped; edges of size > 1 are split; then
     edges are collapsed as long as the new ones stay within 0.9 and triangles of a fair shape. Splits leave
     the surface as it is; flips and collapses, which change it, are made where they keep clear of the cloth
-    and the body (N, 3), (M, 3). Panel space, mass and linear momentum stay; so do corners, curved boundaries
-    and what is locked.
+    and the obstacle. Panel space, mass and linear momentum stay; so do corners, curved boundaries and what is
+    locked. Returns the garment, the number (V',) that each of its vertices had, or -1, and what was done.
 
     Raises InputError if the metric asks for more vertices than make sense.
     """
@@ -163,16 +165,16 @@ def adapt(
         )
     sewn = load(state, metric, room)
     around = Surroundings()
-    tree, body_tree = Tree(state.positions, mesh.faces), Tree(body_vertices, body_faces)
+    tree = Tree(state.positions, mesh.faces)
     around.x = wp.array(state.positions, dtype=wp.vec3d, device="cpu")
     around.faces = wp.array(mesh.faces, dtype=wp.int32, device="cpu")
     around.point = wp.array(mesh.panel_vertices, dtype=wp.vec2d, device="cpu")
     around.panel_faces = wp.array(mesh.panel_faces, dtype=wp.int32, device="cpu")
     around.panel = wp.array(mesh.face_panel, dtype=wp.int32, device="cpu")
     around.tree = tree.id
-    around.body_x = wp.array(body_vertices, dtype=wp.vec3d, device="cpu")
-    around.body_faces = wp.array(body_faces.reshape(-1, 3), dtype=wp.int32, device="cpu")
-    around.body_tree = body_tree.id
+    around.body_x = wp.array(obstacle.vertices, dtype=wp.vec3d, device="cpu")
+    around.body_faces = wp.array(obstacle.faces.reshape(-1, 3), dtype=wp.int32, device="cpu")
+    around.body_tree = obstacle.tree
     made = wp.zeros(4, dtype=wp.int32, device="cpu")
     # An isosceles triangle of that height over its base has about this quality.
     inputs = [sewn, around, wp.float64(aspect_min), made]
@@ -182,4 +184,4 @@ def adapt(
         raise InputError(
             f"remesh: more than {room} vertices are not enough for the sizing field; raise size_min"
         )
-    return unload(sewn, state), Changes(splits, flips, collapses)
+    return *unload(sewn, state), Changes(splits, flips, collapses)

@@ -36,6 +36,11 @@ class Obstacle:
             indices = wp.array(self.faces.ravel(), dtype=wp.int32, device="cpu")
             self._mesh = wp.Mesh(points, indices, bvh_constructor="sah")
 
+    @property
+    def tree(self) -> wp.uint64:
+        """What kernels call its tree, for `wp.mesh_query_aabb`; 0 without triangles."""
+        return wp.uint64(0) if self._mesh is None else self._mesh.id
+
     def move(self, vertices: NDArray[np.float64]) -> None:
         """Put the vertices (N, 3) elsewhere; a twentieth of the cost of a new tree."""
         self.vertices = np.array(vertices, dtype=np.float64)

@@ -30,6 +30,7 @@ class SewnMesh:
     copy        (V,) one panel vertex of each sewn vertex, -1 where it is no more
     size        (2,) sewn vertices ever used, and those of them that are spare
     spare       (V,) stack of sewn vertices that will be used again
+    origin      (V,) number of the vertex in the garment that was loaded, -1 of a new one
     clock       (1,) changes so far; changed (V,) the last of them that concerned each vertex
     refused     (3 F, 2) changes made when the flip and the collapse of an edge were last refused: as long as
                 nothing around it changes, they would be again
@@ -48,6 +49,7 @@ class SewnMesh:
     copy: wp.array(dtype=wp.int32)
     size: wp.array(dtype=wp.int32)
     spare: wp.array(dtype=wp.int32)
+    origin: wp.array(dtype=wp.int32)
     clock: wp.array(dtype=wp.int32)
     changed: wp.array(dtype=wp.int32)
     refused: wp.array2d(dtype=wp.int32)
@@ -90,7 +92,8 @@ def load(state: GarmentState, metric: NDArray[np.float64], room: int) -> SewnMes
     panels.on_rim.numpy()[tail[rim]] = 1
     per_panel_vertex = {"uv": wp.vec2d, "vertex": wp.int32, "next_copy": wp.int32, "home": wp.int32}
     per_vertex = {"x": wp.vec3d, "v": wp.vec3d, "held": wp.vec3d, "area": wp.float64}
-    per_vertex |= {"locked": wp.int32, "copy": wp.int32, "spare": wp.int32, "changed": wp.int32}
+    per_vertex |= {"locked": wp.int32, "copy": wp.int32, "spare": wp.int32, "origin": wp.int32}
+    per_vertex |= {"changed": wp.int32}
     for name, dtype in {**per_panel_vertex, **per_vertex}.items():
         setattr(mesh, name, wp.zeros(room, dtype=dtype, device="cpu"))
     mesh.size = wp.array([size_v, 0], dtype=wp.int32, device="cpu")
@@ -105,13 +108,14 @@ def load(state: GarmentState, metric: NDArray[np.float64], room: int) -> SewnMes
     mesh.held.numpy()[:size_v] = state.held
     mesh.area.numpy()[:size_v] = garment.vertex_areas
     mesh.locked.numpy()[:size_v] = state.locked
+    mesh.origin.numpy()[:size_v] = np.arange(size_v)
     mesh.copy.numpy()[:] = -1
     mesh.copy.numpy()[garment.panel_to_vertex] = np.arange(size_p)
     return mesh
 
 
-def unload(mesh: SewnMesh, source: GarmentState) -> GarmentState:
-    """The garment as it is now: what is left of its old vertices in their order, then the new ones."""
+def unload(mesh: SewnMesh, source: GarmentState) -> tuple[GarmentState, NDArray[np.int32]]:
+    """The garment as it is now, and the number (V',) that each of its vertices had in `source`, or -1."""
     panels = mesh.panels
     count = panels.size.numpy()[1]
     corners = panels.corner.numpy()[: 3 * count].reshape(-1, 3)
@@ -136,13 +140,8 @@ def unload(mesh: SewnMesh, source: GarmentState) -> GarmentState:
         name=source.mesh.name,
         parameters=dict(source.mesh.parameters),
     )
-    return GarmentState(
-        garment,
-        mesh.x.numpy()[sewn].copy(),
-        mesh.v.numpy()[sewn].copy(),
-        mesh.held.numpy()[sewn].copy(),
-        mesh.locked.numpy()[sewn].copy(),
-    )
+    rows = (array.numpy()[sewn].copy() for array in (mesh.x, mesh.v, mesh.held, mesh.locked))
+    return GarmentState(garment, *rows), mesh.origin.numpy()[sewn].copy()
 
 
 def _twins(garment: GarmentMesh) -> NDArray[np.int64]:

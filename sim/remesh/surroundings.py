@@ -17,6 +17,7 @@ from muslin.sim.contact.distance import pair_distance
 wp.set_module_options({"enable_backward": False})
 
 LEAST = wp.constant(wp.float64(2.0e-4))  # s, metres
+SINGLE = wp.constant(1.0e-5)  # metres
 LEAST_TURN = wp.constant(wp.float64(0.5))  # cosine of the largest angle between a new face and the old ones
 
 
@@ -158,8 +159,10 @@ def is_clear(
             if not lies_next_to(around, place, f, wp.float64(2.0) * margin):
                 return False
     if around.body_tree != wp.uint64(0):
-        query = wp.bvh_query_aabb(around.body_tree, low, high)
-        while wp.bvh_query_next(query, f):
+        # Its tree holds vertices in single precision, off by a ten-millionth of their coordinates.
+        slack = wp.vec3(SINGLE, SINGLE, SINGLE)
+        in_box = wp.mesh_query_aabb(around.body_tree, low - slack, high + slack)
+        while wp.mesh_query_aabb_next(in_box, f):
             p = around.body_x[around.body_faces[f, 0]]
             q = around.body_x[around.body_faces[f, 1]]
             r = around.body_x[around.body_faces[f, 2]]

@@ -49,36 +49,36 @@ class ClothSimulator:
         solver: SolverSettings | None = None,
         device: str = "cpu",
     ) -> None:
-        self.cloth = cloth
         self.settings = solver or SolverSettings()
         self.device = device
-        n = cloth.num_vertices
-        self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
-        self.air = None if self.settings.air is None else AirDrag(cloth, self.settings.air, device)
-        points = np.concatenate([positions, collider_vertices])
-        self.contact = ContactSystem(cloth, collider_faces, points, contact or ContactSettings(), device)
-        self.linear = LinearSystem(cloth, device)
-        total = len(points)
-        vec = {"dtype": wp.vec3d, "device": device}
-        self.x = wp.array(points, **vec)
-        self.start = wp.zeros(total, **vec)
-        self.trial = wp.zeros(total, **vec)
-        self.p = wp.zeros(total, **vec)
-        self.remaining = wp.zeros(total, **vec)
-        self.base = wp.zeros(total, **vec)
-        self.uncut = wp.zeros(total, **vec)
-        self.target = wp.zeros(n, **vec)
-        self.gradient = wp.zeros(n, **vec)
-        self.weight = wp.zeros(n, dtype=wp.float64, device=device)
-        self.mass = wp.array(cloth.mass, dtype=wp.float64, device=device)
+        self._contact_settings = contact or ContactSettings()
         self.carry = Carry(collider_vertices, collider_faces, device) if len(collider_faces) else None
         self._scalar = wp.zeros(1, dtype=wp.float64, device=device)
-        self._energy_here: float | None = None
-        self.velocity = np.zeros((n, 3))
-        self.pins = np.zeros(n, bool)
         self.yielding = np.zeros(len(collider_vertices), bool)
         self.work_left = np.inf
         self._gravity = wp.vec3d(*self.settings.gravity)
+        self._wear(cloth, np.concatenate([positions, collider_vertices]), collider_faces)
+
+    def _wear(
+        self, cloth: ClothModel, points: NDArray[np.float64], collider_faces: NDArray[np.int32]
+    ) -> None:
+        """Make all that depends on the cloth, at rest and without pins at `points` (V + N, 3)."""
+        self.cloth = cloth
+        n, total, device = cloth.num_vertices, len(points), self.device
+        self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
+        self.air = None if self.settings.air is None else AirDrag(cloth, self.settings.air, device)
+        self.contact = ContactSystem(cloth, collider_faces, points, self._contact_settings, device)
+        self.linear = LinearSystem(cloth, device)
+        self.x = wp.array(points, dtype=wp.vec3d, device=device)
+        self.start, self.trial, self.p, self.remaining, self.base, self.uncut = (
+            wp.zeros(total, dtype=wp.vec3d, device=device) for _ in range(6)
+        )
+        self.target, self.gradient = (wp.zeros(n, dtype=wp.vec3d, device=device) for _ in range(2))
+        self.weight = wp.zeros(n, dtype=wp.float64, device=device)
+        self.mass = wp.array(cloth.mass, dtype=wp.float64, device=device)
+        self._energy_here: float | None = None
+        self.velocity = np.zeros((n, 3))
+        self.pins = np.zeros(n, bool)
         self.contact.search.renew(self.x)
 
     @property
@@ -143,6 +143,25 @@ class ClothSimulator:
         """Put cloth and collider somewhere else, at rest; they must not intersect there."""
         self.restore(np.concatenate([positions, collider_vertices]), np.zeros_like(positions))
         self.contact.forget_friction()
+
+    def replace_cloth(
+        self,
+        cloth: ClothModel,
+        positions: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        held: NDArray[np.float64],
+    ) -> None:
+        """Go on with another mesh of the same cloth: (V', 3) positions, m, velocities, m/s, and what friction
+        holds, m. Nothing is pinned then."""
+        points = np.concatenate([positions, self.collider_vertices])
+        self._wear(cloth, points, self.contact.collider_faces)
+        self.velocity = velocity.copy()
+        self.contact.friction.bristle.assign(held)
+
+    @property
+    def held(self) -> NDArray[np.float64]:
+        """(V, 3) what friction holds, metres (a copy)."""
+        return self.contact.friction.bristle.numpy().copy()
 
     def turn_world(self, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
         """Move everything as one rigid piece, what friction holds too: x -> turn x + shift, to rest."""
