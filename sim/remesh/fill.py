@@ -145,6 +145,21 @@ def _clip(mesh: PanelMesh, rings: Rings) -> None:
             f"panel {rings.panel[stuck[0]]}: its boundary crosses itself where it is sampled; "
             "choose a smaller area"
         )
+    _close_bridges(mesh)
+
+
+def _close_bridges(mesh: PanelMesh) -> None:
+    """Makes the two sides of bridges to holes twins: to `clip_ears` either is boundary."""
+    corner, twin, leaving = mesh.corner.numpy(), mesh.twin.numpy(), mesh.leaving.numpy()
+    rim = np.flatnonzero(twin[: 3 * int(mesh.size.numpy()[1])] == int(FREE))
+    ends = np.stack([corner[rim], corner[np.where(rim % 3 == 2, rim - 2, rim + 1)]], axis=1).astype(np.int64)
+    size = len(leaving)
+    key, opposite = ends @ [size, 1], ends @ [1, size]
+    order = np.argsort(key)
+    there = order[np.minimum(np.searchsorted(key, opposite, sorter=order), len(order) - 1)]
+    bridge = key[there] == opposite
+    twin[rim[bridge]] = rim[there[bridge]]
+    leaving[ends[~bridge, 0]] = rim[~bridge]
 
 
 def _compacted(mesh: PanelMesh, rim: int) -> Filling:

@@ -103,6 +103,7 @@ def remesh(
     if not max_distortion > 1.0:
         raise InputError(f"max_distortion = {max_distortion:g}: must be more than 1, which is equilateral")
     metric = _metric(mesh, target)
+    _check_room(mesh, metric)
     space = PanelSpace(mesh)
     rng = np.random.default_rng(seed)
     enough = least_quality(min(max_distortion, MENDED))
@@ -134,14 +135,28 @@ def _draw(
     panel = mesh.face_panel[rim.face]
     field = Field(mesh, metric, space, space.lift(rim.points, panel), rim.spacing)
     boundary = rings(rim.points, rim.after, panel)
-    faces_wanted = np.bincount(
-        mesh.face_panel, mesh.face_areas * area_density(metric[mesh.panel_faces].mean(axis=1)) / EQUILATERAL
-    )
     # F = 2 I + B - 2 of a disk with I vertices inside and B on its boundary; a hole adds 2.
     nodes = np.bincount(boundary.panel, boundary.length - 2.0, minlength=len(mesh.panel_names))
-    wanted = np.maximum(np.round(0.5 * (faces_wanted - nodes)), 0.0).astype(np.int64)
+    wanted = np.maximum(np.round(0.5 * (_faces_wanted(mesh, metric) - nodes)), 0.0).astype(np.int64)
     filling = fill(rim.points, panel, boundary, wanted, field.at, enough, rng)
     return _sewn(mesh, np.asarray(positions, dtype=np.float64), space, rim, filling), field
+
+
+def _faces_wanted(mesh: GarmentMesh, metric: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How many triangles each panel is to have."""
+    density = area_density(metric[mesh.panel_faces].mean(axis=1)) / EQUILATERAL
+    return np.bincount(mesh.face_panel, mesh.face_areas * density, len(mesh.panel_names))
+
+
+def _check_room(mesh: GarmentMesh, metric: NDArray[np.float64]) -> None:
+    wanted = _faces_wanted(mesh, metric)
+    panel = int(np.argmin(wanted))
+    if wanted[panel] < 1.0:
+        area = mesh.face_areas[mesh.face_panel == panel].sum()
+        raise InputError(
+            f"panel '{mesh.panel_names[panel]}' has {area:.3g} m^2, less than one triangle of its target area, "
+            f"{area / wanted[panel]:.3g} m^2; choose a smaller one"
+        )
 
 
 def _metric(
