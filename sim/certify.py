@@ -13,6 +13,7 @@ from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.elastic import principal_stretches
 from muslin.sim.relax import RestReport
+from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.scene import Scene
 
 
@@ -44,14 +45,23 @@ def certify(sample: Sample, base: Certificate) -> Sample:
 
 
 def solved(
-    scene: Scene, distance: float, rest: RestReport | None, started: float, frames: int
+    scene: Scene,
+    distance: float,
+    rest: RestReport | None,
+    started: float,
+    frames: int,
+    remesher: Remesher | None = None,
 ) -> Certificate:
-    """What the solver knows of a sample: `distance` m at the closest, how it came to `rest`, versions, and
-    the seconds since `started`, a time of `time.perf_counter`."""
+    """What the solver knows of a sample: `distance` m at the closest, how it came to `rest`, versions, what
+    the `remesher` did, and the seconds since `started`, a time of `time.perf_counter`."""
     seconds = time.perf_counter() - started
     extra: dict[str, float | int | bool] = {"seconds_per_frame": seconds / frames}
     if rest is not None:
         extra |= {"settle_steps": rest.steps, "last_move_m": rest.moved, "at_rest": rest.at_rest}
+    if remesher is not None:
+        done = remesher.changes
+        extra |= {"splits": done.splits, "flips": done.flips, "collapses": done.collapses}
+        extra |= {"remesh_seconds": remesher.seconds}
     return Certificate(
         min_distance_m=distance if np.isfinite(distance) else None,
         force_residual=None if rest is None else rest.residual,

@@ -89,7 +89,8 @@ def build_cloth(
     faces = mesh.faces.astype(np.int32)
     n = int(faces.max()) + 1
     vertex_area, mass = (
-        np.bincount(faces.ravel(), np.repeat(share / 3.0, 3), minlength=n) for share in (area, density * area)
+        np.bincount(faces.ravel(), np.repeat(share / 3.0, 3), minlength=n).astype(np.float64)
+        for share in (area, density * area)
     )
 
     edges, _, edge_of_corner = _edges(faces)

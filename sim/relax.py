@@ -48,15 +48,17 @@ def settle(
     tolerance: float,
     max_steps: int,
     tick: Callable[[], None] | None = None,
+    remesh: Callable[[], object] | None = None,
 ) -> RestReport:
     """Step until `STILL_STEPS` steps of `LONGEST` seconds moved no vertex by more than `tolerance` metres.
 
-    At most `max_steps` steps, half of them swinging.
+    At most `max_steps` steps, half of them swinging; `remesh` is called after each of these, `tick` after
+    every step. The mesh that the cloth has when the swing is over is that in which it comes to rest.
     """
     usual = sim.settings
     sim.settings = replace(usual, linear_tolerance=min(usual.linear_tolerance, LINEAR_TOLERANCE))
     try:
-        steps = _swing(sim, SWING * tolerance, max_steps // 2, tick)
+        steps = _swing(sim, SWING * tolerance, max_steps // 2, tick, remesh)
         dt, still, moved = SWING_STEP, 0, np.inf
         while steps < max_steps and still < STILL_STEPS:
             moved = measured_step(sim, dt, inertia=False)
@@ -70,7 +72,13 @@ def settle(
     return RestReport(steps, moved, sim.force_residual(LONGEST), still >= STILL_STEPS)
 
 
-def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable[[], None] | None) -> int:
+def _swing(
+    sim: ClothSimulator,
+    tolerance: float,
+    max_steps: int,
+    tick: Callable[[], None] | None,
+    remesh: Callable[[], object] | None,
+) -> int:
     """Kinetic damping until `STILL_SWINGS` steps moved no vertex by over `tolerance`; the steps taken."""
     energy = 0.0
     still = steps = 0
@@ -82,6 +90,8 @@ def _swing(sim: ClothSimulator, tolerance: float, max_steps: int, tick: Callable
             sim.velocity[:] = 0.0
             now = 0.0
         energy = now
+        if remesh is not None:
+            remesh()
         if tick is not None:
             tick()
     sim.velocity[:] = 0.0

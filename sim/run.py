@@ -17,6 +17,7 @@ from muslin.sim.body.model import BodyModel
 from muslin.sim.budget import with_budget
 from muslin.sim.certify import certify, solved
 from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.remeshed import sample_of_frames
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.device import open_device
 from muslin.sim.failure import stopped
@@ -26,6 +27,7 @@ from muslin.sim.motion.grounding import fit_to_body
 from muslin.sim.motion.lead_in import lead_in
 from muslin.sim.motion.motion import Motion
 from muslin.sim.relax import RestReport, settle
+from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.scene import Scene
 from muslin.sim.setting import cut_garment, garments_of, settings_of
 from muslin.sim.solve.errors import SimulationError
@@ -84,6 +86,8 @@ def simulate_chain(
     except SimulationError as error:
         raise SimulationError(f"scene {first.name}, {error}", error.state) from error
     work.finish(DRESS_WORK * len(garments))
+    if first.remesh is not None:
+        worn.remesher = Remesher(first.remesh.settings, mesh, [g.fabric for g in garments])
     for scene in scenes:
         if clip is None:
             yield _drape(scene, mesh, worn, work, started)
@@ -152,12 +156,13 @@ def _drape(scene: Scene, mesh: GarmentMesh, worn: WornGarment, work: _Work, star
         worn.morph(beta, pose, next_step)
         worn.carry(worn.theta, np.array([0.0, float(worn.model.ground_offset(beta, pose)), 0.0]))
         work.finish(MORPH_WORK)
-        rest = settle(worn.sim, scene.solver.settle_tolerance, scene.solver.settle_steps, tick=next_step)
+        tolerance, steps = scene.solver.settle_tolerance, scene.solver.settle_steps
+        rest = settle(worn.sim, tolerance, steps, next_step, worn.remesh)
         state = _state(worn)
     except SimulationError as error:
         raise stopped(f"scene {scene.name}, drape", error, worn.sim) from error
     work.finish(scene.solver.settle_steps)
-    return _sample(scene, mesh, worn, [worn.sim.positions], [state], rest, started)
+    return _sample(scene, [_mesh(worn, mesh)], worn, [worn.sim.positions], [state], rest, started)
 
 
 def _shared(scene: Scene) -> dict[str, object]:
@@ -196,7 +201,7 @@ def _sequence(
     poses, translations = clip.at(times)
     path = [*zip(way_in.poses[1:], way_in.translations[1:], strict=True)]
     path += [*zip(poses[1:], translations[1:], strict=True)]
-    positions, states = [], []
+    positions, meshes, states = [], [], []
     next_step = with_budget(worn.sim, scene.solver.max_work, work.tick)
     for k, (theta, translation) in enumerate(path):
         passed = k + 1 - (len(way_in.poses) - 1)
@@ -204,18 +209,25 @@ def _sequence(
             worn.sim.work_left = scene.solver.max_work
         try:
             worn.follow(theta, translation, 1.0 / step_rate)
+            worn.remesh()
             if passed == 0:
                 steps = scene.solver.settle_steps // 3
-                settle(worn.sim, scene.solver.settle_tolerance, steps, tick=next_step)
+                settle(worn.sim, scene.solver.settle_tolerance, steps, next_step, worn.remesh)
                 work.finish(MORPH_WORK)
             if passed >= 0 and passed % substeps == 0:
                 positions.append(worn.sim.positions)
+                meshes.append(_mesh(worn, mesh))
                 states.append(_state(worn))
                 work.tick()
         except SimulationError as error:
             where = "lead-in" if passed <= 0 else f"frame {passed // substeps}"
             raise stopped(f"scene {scene.name}, {where}", error, worn.sim) from error
-    return _sample(scene, mesh, worn, positions, states, None, started, clip)
+    return _sample(scene, meshes, worn, positions, states, None, started, clip)
+
+
+def _mesh(worn: WornGarment, begun: GarmentMesh) -> GarmentMesh:
+    """The mesh that the cloth has now; `begun`, with which it was put on, unless it is remeshed."""
+    return begun if worn.remesher is None else worn.remesher.mesh
 
 
 _State = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32], float]
@@ -227,7 +239,7 @@ def _state(worn: WornGarment) -> _State:
 
 def _sample(
     scene: Scene,
-    mesh: GarmentMesh,
+    meshes: list[GarmentMesh],
     worn: WornGarment,
     positions: list[NDArray[np.float64]],
     states: list[_State],
@@ -243,11 +255,11 @@ def _sample(
         poses=np.array([state[0] for state in states]),
         translations=np.array([state[1] for state in states]),
     )
-    sample = Sample(
+    sample = sample_of_frames(
+        meshes,
+        positions,
         id=scene.name,
         kind="drape" if scene.motion is None else "sequence",
-        garment=mesh,
-        positions=np.array(positions, dtype=np.float32),
         certificate=Certificate(),
         fps=None if scene.motion is None else scene.motion.fps,
         body=track,
@@ -258,4 +270,4 @@ def _sample(
         labels={"sequence": clip.name, "motion_source": clip.source} if clip is not None else {},
     )
     distance = min(state[3] for state in states)
-    return certify(sample, solved(scene, distance, rest, started, len(positions)))
+    return certify(sample, solved(scene, distance, rest, started, len(positions), worn.remesher))

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
+from muslin.sim.remesh.settings import RemeshTable
 from muslin.sim.table_errors import explain
 from muslin.sim.tables import ZERO, Finite, Positive, RepeatTable, Table, Vector
 from muslin.sim.toml_values import read_values
@@ -159,6 +160,7 @@ class Scene(Table):
     gravity: Vector = (0.0, -9.81, 0.0)
     air: AirTable | None = None
     solver: SolverTable = SolverTable()
+    remesh: RemeshTable | None = None
     seed: Annotated[int, Field(ge=0)] = 0
     expect: ExpectTable = ExpectTable()
 

@@ -15,6 +15,7 @@ from muslin.sim.contact.clearance import SelfClearance, room_for
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.intersections import crossed_body_faces
 from muslin.sim.layers import dress
+from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.settings import SolverSettings, StepReport
 from muslin.sim.solve.simulator import ClothSimulator
@@ -92,6 +93,12 @@ class WornGarment:
         room = room_for(np.concatenate([cloth.rest_area for cloth in cloths]))
         self.clearance = SelfClearance(model.vertices(beta, REST_POSE), model.faces, device, room)
         self.sim = dress(meshes, cloths, model, beta, contact, solver, device, tick)
+        self.remesher: Remesher | None = None
+
+    def remesh(self) -> None:
+        """To be called after a time step: the mesh follows what the cloth does, if there is a `remesher`."""
+        if self.remesher is not None:
+            self.remesher.step(self.sim)
 
     def body(self) -> NDArray[np.float64]:
         """(N, 3) vertices of the body as it stands, metres."""

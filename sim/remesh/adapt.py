@@ -66,9 +66,9 @@ def flip_all(mesh: SewnMesh, around: Surroundings, made: wp.array(dtype=wp.int32
                 w = mesh.vertex[head(panels, h)]
                 again = was_refused(mesh, h, 0, v, w)
                 if again:
-                    again = was_refused(
-                        mesh, h, 0, mesh.vertex[apex(panels, h)], mesh.vertex[apex(panels, t)]
-                    )
+                    c = mesh.vertex[apex(panels, h)]
+                    d = mesh.vertex[apex(panels, t)]
+                    again = was_refused(mesh, h, 0, c, d)
                 if not again:
                     if flip_if_better(mesh, around, h):
                         made[1] += 1
@@ -102,9 +102,10 @@ def collapse_short(mesh: SewnMesh, around: Surroundings, least: wp.float64, made
             tail = panels.corner[h]
             tip = head(panels, h)
             if not was_refused(mesh, h, 1, mesh.vertex[tail], mesh.vertex[tip]):
-                if collapse_if_fine(mesh, around, h, tail, least) or collapse_if_fine(
-                    mesh, around, h, tip, least
-                ):
+                done = collapse_if_fine(mesh, around, h, tail, least)
+                if not done:
+                    done = collapse_if_fine(mesh, around, h, tip, least)
+                if done:
                     made[2] += 1
                 else:
                     mesh.refused[h, 1] = mesh.clock[0]
@@ -160,8 +161,8 @@ def adapt(
     room = int(SPARE * max(asked, len(mesh.panel_vertices))) + 256
     if room > MOST_VERTICES:
         raise InputError(
-            f"remesh: the sizing field asks for some {asked:.3g} vertices; allowed are {MOST_VERTICES / SPARE:g}: "
-            "raise size_min or the refine_ keys"
+            f"remesh: the sizing field asks for some {asked:.3g} vertices; allowed are "
+            f"{MOST_VERTICES / SPARE:.3g}: raise size_min or the refine_ keys"
         )
     sewn = load(state, metric, room)
     around = Surroundings()

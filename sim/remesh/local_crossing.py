@@ -1,4 +1,4 @@
-"""Whether a new triangle of a garment crosses the faces that it has a vertex in common with, or lies where."""
+"""Where a new triangle of a garment would lie, and whether it would cross faces around its vertices."""
 
 import warp as wp
 

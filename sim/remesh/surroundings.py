@@ -3,9 +3,9 @@
 Checked against the surface as it was before any change, and the body. Let an operation move the surface by up
 to d, and demand that its triangles stay 2 d + s away from the old surface elsewhere. Then two new triangles
 of operations with d1, d2 stay apart: their distance D is at least 2 d1 + s - d2 and 2 d2 + s - d1, since each
-lies within its d of the old surface, so 2 D >= d1 + d2 + 2 s > 0. Old faces that lie under
-the triangle or next to it, nearer than twice the margin in panel space, are left out: a surface touches itself
-there. Among those it must not cross the faces around its corners (`crosses`), nor turn much (`turns_little`).
+lies within its d of the old surface, so 2 D >= d1 + d2 + 2 s > 0. Old faces that lie under the triangle or
+next to it, nearer than twice the margin in panel space, are left out: a surface touches itself there. Among
+those it must not cross the faces around its corners (`local_crossing`), nor turn much (`turns_little`).
 """
 
 import numpy as np
@@ -39,7 +39,7 @@ class Surroundings:
 
 @wp.struct
 class Place:
-    """Where a new triangle lies in panel space: its corners, old faces in or near which they are, its panel."""
+    """Where a new triangle lies in panel space: corners, old faces in or near which they are, panel."""
 
     a: wp.vec2d
     b: wp.vec2d
@@ -85,8 +85,8 @@ def pierces(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> 
 def triangles_within(
     a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, p: wp.vec3d, q: wp.vec3d, r: wp.vec3d, d: wp.float64
 ) -> bool:
-    """Whether two triangles cross or come nearer than d: by all edges through either, and all fifteen pairs of
-    a vertex and a face or two edges."""
+    """Whether two triangles cross or come nearer than d: by edges through either, and all fifteen pairs of a
+    vertex and a face or two edges."""
     if pierces(a, b, p, q, r) or pierces(b, c, p, q, r) or pierces(c, a, p, q, r):
         return True
     if pierces(p, q, a, b, c) or pierces(q, r, a, b, c) or pierces(r, p, a, b, c):
@@ -126,8 +126,8 @@ def flat(p: wp.vec2d) -> wp.vec3d:
 
 @wp.func
 def lies_next_to(around: Surroundings, place: Place, f: int, reach: wp.float64) -> bool:
-    """Whether an old face near the corners of a triangle lies under it, or nearer than `reach` in panel space;
-    of another panel, beyond a seam, it does."""
+    """Whether an old face near the corners of a triangle lies under it, or nearer than `reach` in panel
+    space; of another panel, beyond a seam, it does."""
     near = shares_vertex(around.faces, f, place.home[0]) or shares_vertex(around.faces, f, place.home[1])
     if not near and not shares_vertex(around.faces, f, place.home[2]):
         return False
@@ -155,9 +155,9 @@ def is_clear(
         p = around.x[around.faces[f, 0]]
         q = around.x[around.faces[f, 1]]
         r = around.x[around.faces[f, 2]]
-        if triangles_within(a, b, c, p, q, r, margin):
-            if not lies_next_to(around, place, f, wp.float64(2.0) * margin):
-                return False
+        far = wp.float64(2.0) * margin
+        if triangles_within(a, b, c, p, q, r, margin) and not lies_next_to(around, place, f, far):
+            return False
     if around.body_tree != wp.uint64(0):
         # Its tree holds vertices in single precision, off by a ten-millionth of their coordinates.
         slack = wp.vec3(SINGLE, SINGLE, SINGLE)

@@ -145,7 +145,9 @@ def _draw(
 def _faces_wanted(mesh: GarmentMesh, metric: NDArray[np.float64]) -> NDArray[np.float64]:
     """How many triangles each panel is to have."""
     density = area_density(metric[mesh.panel_faces].mean(axis=1)) / EQUILATERAL
-    return np.bincount(mesh.face_panel, mesh.face_areas * density, len(mesh.panel_names))
+    wanted = np.zeros(len(mesh.panel_names))
+    np.add.at(wanted, mesh.face_panel, mesh.face_areas * density)
+    return wanted
 
 
 def _check_room(mesh: GarmentMesh, metric: NDArray[np.float64]) -> None:
@@ -154,8 +156,8 @@ def _check_room(mesh: GarmentMesh, metric: NDArray[np.float64]) -> None:
     if wanted[panel] < 1.0:
         area = mesh.face_areas[mesh.face_panel == panel].sum()
         raise InputError(
-            f"panel '{mesh.panel_names[panel]}' has {area:.3g} m^2, less than one triangle of its target area, "
-            f"{area / wanted[panel]:.3g} m^2; choose a smaller one"
+            f"panel '{mesh.panel_names[panel]}' has {area:.3g} m^2, less than one triangle of its target "
+            f"area, {area / wanted[panel]:.3g} m^2; choose a smaller one"
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,14 @@ class Pins:
                 held[pin.vertices] = True
                 targets[pin.vertices] = pin.motion.at(self._start[pin.vertices], time)
         return held, targets
+
+    def renumber(self, origin: NDArray[np.int32]) -> None:
+        """The cloth has other vertices (V',) now: those with these numbers before, -1 for new ones."""
+        place = np.full(len(self._start), -1)
+        old = np.flatnonzero(origin >= 0)
+        place[origin[old]] = old
+        self._held = [replace(pin, vertices=place[pin.vertices]) for pin in self._held]
+        self._start = np.where((origin >= 0)[:, None], self._start[origin], 0.0)
 
 
 def _region(k: int, table: PinTable, mesh: GarmentMesh) -> NDArray[np.int64]:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.merge import merge_meshes
+from muslin.garments.mesh import GarmentMesh
 from muslin.sim.budget import with_budget
 from muslin.sim.certify import certify, solved
 from muslin.sim.cloth import merge_cloths
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.intersections import count_intersections
+from muslin.sim.dataset.remeshed import sample_of_frames
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.failure import stopped
 from muslin.sim.relax import RestReport, settle
+from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.scene import Scene
 from muslin.sim.setting import garments_of, settings_of
 from muslin.sim.solve.errors import SimulationError
@@ -40,16 +44,14 @@ def play(scene: Scene, device: str, tick: Tick) -> Sample:
     else:
         frames = stage.run(tick)
     moving = stage.colliders.moves and len(frames) > 1
-    sample = Sample(
+    sample = sample_of_frames(
+        [frame.mesh for frame in frames],
+        [frame.positions for frame in frames],
         id=scene.name,
         kind="drape" if scene.sequence is None else "sequence",
-        garment=stage.mesh,
-        positions=np.array([positions for positions, _, _ in frames], dtype=np.float32),
         certificate=Certificate(),
         fps=None if scene.sequence is None else scene.sequence.fps,
-        obstacle_vertices=np.array(
-            [vertices for _, vertices, _ in frames[: None if moving else 1]], np.float32
-        )
+        obstacle_vertices=np.array([frame.colliders for frame in frames[: None if moving else 1]], np.float32)
         if len(stage.colliders.faces)
         else None,
         obstacle_faces=stage.colliders.faces if len(stage.colliders.faces) else None,
@@ -57,12 +59,18 @@ def play(scene: Scene, device: str, tick: Tick) -> Sample:
         scene=scene.model_dump(mode="json"),
         seed=scene.seed,
     )
-    distance = min(frame[2] for frame in frames)
-    return certify(sample, solved(scene, distance, rest, started, len(frames)))
+    distance = min(frame.distance for frame in frames)
+    return certify(sample, solved(scene, distance, rest, started, len(frames), stage.remesher))
 
 
-_Frame = tuple[NDArray[np.float64], NDArray[np.float64], float]
-"""Positions (V, 3) of the cloth and (N, 3) of the colliders, and their smallest distance; metres."""
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """A mesh and its positions (V, 3), those of the colliders (N, 3), and their smallest distance; metres."""
+
+    mesh: GarmentMesh
+    positions: NDArray[np.float64]
+    colliders: NDArray[np.float64]
+    distance: float
 
 
 class _Stage:
@@ -72,7 +80,7 @@ class _Stage:
         self.scene = scene
         garments = garments_of(scene)
         meshes = [g.mesh for g in garments]
-        self.mesh = merge_meshes([g.name for g in garments], meshes)
+        self.begun = merge_meshes([g.name for g in garments], meshes)
         self.cloth = merge_cloths([g.cloth for g in garments])
         start = np.concatenate(
             [lay_flat(g.mesh, g.table.position, g.table.rotation) + g.shift for g in garments]
@@ -90,16 +98,27 @@ class _Stage:
         contact, solver = settings_of(scene)
         self.sim = ClothSimulator(self.cloth, start, there, self.colliders.faces, contact, solver, device)
         self.sim.pins, _ = self.pins.at(0.0)
+        self.remesher: Remesher | None = None
+        if scene.remesh is not None:
+            self.remesher = Remesher(scene.remesh.settings, self.begun, [g.fabric for g in garments])
 
     def frame(self, time: float) -> _Frame:
         """What is stored of the state at `time` s."""
-        return self.sim.positions, self.colliders.at(time), self.sim.contact.smallest_distance(self.sim.x)
+        mesh = self.begun if self.remesher is None else self.remesher.mesh
+        distance = self.sim.contact.smallest_distance(self.sim.x)
+        return _Frame(mesh, self.sim.positions, self.colliders.at(time), distance)
+
+    def remesh(self) -> None:
+        """To be called after a time step: the mesh follows what the cloth does, if the scene says so."""
+        origin = None if self.remesher is None else self.remesher.step(self.sim)
+        if origin is not None:
+            self.pins.renumber(origin)
 
     def settle(self, tick: Tick) -> RestReport:
         s = self.scene.solver
         next_step = with_budget(self.sim, s.max_work, tick)
         try:
-            return settle(self.sim, s.settle_tolerance, s.settle_steps, tick=next_step)
+            return settle(self.sim, s.settle_tolerance, s.settle_steps, next_step, self.remesh)
         except SimulationError as error:
             raise stopped(f"scene {self.scene.name}", error, self.sim) from error
 
@@ -117,6 +136,7 @@ class _Stage:
                 goal = self.colliders.at(now) if self.colliders.moves else None
                 try:
                     self.sim.advance(goal, 1.0 / (fps * substeps), pin_targets=targets)
+                    self.remesh()
                 except SimulationError as error:
                     where = f"scene {self.scene.name}, frame {frame}"
                     raise stopped(where, error, self.sim) from error
