@@ -43,8 +43,9 @@ def forced(mesh: GarmentMesh, source: GarmentMesh, metric: Array, largest: float
     """(F,) whether a triangle of `mesh` lies in a corner that the pattern makes too sharp for `largest`, D.
 
     A triangle with an angle beta <= 60 degrees has a distortion of at least sqrt(3) / (2 sin beta), that of
-    the isosceles one. So corners of `source` with sin beta < sqrt(3) / (2 D), angles in the metric (P, 2, 2)
-    at its panel vertices, are left out, and nothing else.
+    the isosceles one. So at corners of `source` with sin beta < sqrt(3) / (2 D), angles in the metric
+    (P, 2, 2) at its panel vertices, triangles are left out whose middle lies where the tip is narrower than
+    an edge: within 1 / (2 sin(beta / 2)) of the corner, in the metric there. Nothing else is.
     """
     edges = _edges(source)
     of_face = metric[source.panel_faces].mean(axis=1)
@@ -55,8 +56,15 @@ def forced(mesh: GarmentMesh, source: GarmentMesh, metric: Array, largest: float
         u, v = edges[:, k], -edges[:, k - 1]
         angles[:, k] = np.arctan2(across, np.einsum("fi,fij,fj->f", u, of_face, v))
     sharp = np.arcsin(min(0.5 * np.sqrt(3.0) / largest, 1.0))
-    corners = corners_at(mesh, source, boundary_angles(source, angles) < sharp)
-    return np.asarray(corners.any(axis=1))
+    beta = boundary_angles(source, angles)
+    middle = mesh.panel_vertices[mesh.panel_faces].mean(axis=1)
+    found = corners_at(mesh, source, beta < sharp).any(axis=1)
+    for corner in np.flatnonzero(beta < sharp):
+        way = middle - source.panel_vertices[corner]
+        square = np.einsum("fi,ij,fj->f", way, metric[corner], way)
+        near = square < (0.5 / np.sin(0.5 * beta[corner])) ** 2
+        found |= near & (mesh.face_panel == source.panel_vertex_panel[corner])
+    return np.asarray(found)
 
 
 def _edges(mesh: GarmentMesh) -> Array:

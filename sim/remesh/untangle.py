@@ -13,7 +13,9 @@ from muslin.sim.dataset.intersections import Crossings, find_crossings
 from muslin.sim.remesh.panel_space import PanelSpace
 from muslin.sim.remesh.topology import Remeshed
 
-ROUNDS = 40
+ROUNDS, SUSPICIOUS = 40, 6
+"""Rounds at most, and after how many the source itself is looked at; most drapes take two or three."""
+
 CLEARANCE = 2e-4
 """Metres between two layers where they crossed: those of a source may touch to a hair, and larger triangles
 cannot follow them to that."""
@@ -48,20 +50,27 @@ def untangle(
     source = _Source(remeshed, np.asarray(positions, dtype=np.float64))
     x, faces = remeshed.positions.copy(), remeshed.mesh.faces
     crossings = find_crossings(x, faces, body_x, body_f)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         if not len(crossings):
             return replace(remeshed, positions=x)
+        if number == SUSPICIOUS:
+            _check_source(remeshed, positions, body_x, body_f)
         x += _moves(crossings, x, faces, source)
         crossings = find_crossings(x, faces, body_x, body_f)
-    there = find_crossings(positions, remeshed.source.faces, body_x, body_f)
-    if len(there):
-        raise InputError(
-            f"the drape to be remeshed has {len(there)} intersections itself; remesh one that is free of them"
-        )
     raise InputError(
         f"{len(crossings)} intersections are left in the new triangulation after {ROUNDS} rounds: its "
         "triangles are too large for the folds of this drape; choose a smaller area or another seed"
     )
+
+
+def _check_source(
+    remeshed: Remeshed, positions: Array, body_vertices: Array, body_faces: NDArray[np.int32]
+) -> None:
+    there = len(find_crossings(positions, remeshed.source.faces, body_vertices, body_faces))
+    if there:
+        raise InputError(
+            f"the drape to be remeshed has {there} intersections itself; remesh one that is free of them"
+        )
 
 
 class _Source:

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from muslin.eval.cli.app import app
 from muslin.sim.dataset.reader import open_dataset, write_dataset
 
-COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "remesh", "render", "view")
+COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "remesh")
+COMMANDS += ("render", "view")
 
 
 def muslin(*arguments, code: int = 0):
