@@ -32,16 +32,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array, vstack
 
+from muslin.sim.curvature_fit import fit
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-CONDITION = 0.02
-"""Smallest over largest eigenvalue of the normal equations of a fit that its hinges determine."""
-GROWTH = 3
-"""How often a fit may take in the neighbours of its triangles."""
-
-_ISOMETRIC = np.array([1.0, 1.0, np.sqrt(0.5)])
-"""Rows over (K11, K22, K12) times this are rows over components whose Euclidean norm is |K|."""
 
 
 def curvature_operator(
@@ -79,10 +73,8 @@ def curvature_operator(
     start = np.concatenate([sides[0][0], free_face])
     beside = np.concatenate([sides[1][0], np.full(len(free_face), -1)])
     beside_turn = np.concatenate([turn[sides[0]], np.zeros(len(free_face))])
-    patches = _Patches(
-        np.stack([start, beside], 1), np.stack([np.zeros(len(start)), beside_turn], 1), neighbour, turn
-    )
-    fitted = _fit(wanted, patches, measured, hinge_of_corner, num_hinges)
+    edges = np.stack([start, beside], axis=1)
+    fitted = fit(measured, hinge_of_corner, neighbour, turn, wanted, edges, beside_turn, num_hinges)
 
     half = 0.5 * eye_array(num_hinges, format="csr")
     slope = vstack([half + fitted[:num_hinges], half - fitted[:num_hinges], fitted[num_hinges:]])
@@ -126,66 +118,6 @@ class _Slopes:
         return _Slopes(length, direction, np.stack([n, t], axis=-2), alpha, 0.5 * length[:, 0] * h[:, 0])
 
 
-@dataclass(frozen=True)
-class _Patches:
-    """Triangles (N, m) around each of N edges, -1 for none, and the angle (N, m) that turns directions of
-    their panel frame into that of the first one."""
-
-    faces: Index
-    turned: Array
-    neighbour: Index
-    turn: Array
-
-    def grown(self, chosen: NDArray[np.bool_]) -> _Patches:
-        faces, turned = self.faces[chosen], self.turned[chosen]
-        beyond = np.where(faces[..., None] >= 0, self.neighbour[faces], -1)
-        beyond_turned = turned[..., None] + self.turn[faces]
-        count = len(faces)
-        return _Patches(
-            np.concatenate([faces, beyond.reshape(count, -1)], axis=1),
-            np.concatenate([turned, beyond_turned.reshape(count, -1)], axis=1),
-            self.neighbour,
-            self.turn,
-        )
-
-
-def _fit(
-    wanted: Array, patches: _Patches, measured: Array, hinge_of_corner: Index, num_hinges: int
-) -> csr_array:
-    """(N, H) weights of hinge angles for `wanted` (N, 3) . K, K fitted to the hinges of each patch.
-
-    `measured` (F, 3, 3): hinge angles as rows over (K11, K22, K12). The rows are brought to unit length, and
-    a hinge counts once for each triangle of the patch that has it.
-    """
-    edges, hinges, weights = [], [], []
-    remaining = np.arange(len(wanted))
-    for growth in range(GROWTH + 1):
-        count = len(remaining)
-        hinge = hinge_of_corner[patches.faces]
-        valid = ((patches.faces[..., None] >= 0) & (hinge >= 0)).reshape(count, -1)
-        rows = _turned(measured[patches.faces], patches.turned[..., None]) * _ISOMETRIC
-        norm = np.linalg.norm(rows, axis=-1).reshape(count, -1)
-        rows = rows.reshape(count, -1, 3) * (valid / np.where(valid, norm, 1.0))[..., None]
-        values, vectors = np.linalg.eigh(np.einsum("nip,niq->npq", rows, rows))
-        bound = CONDITION * values[:, 2:]
-        done = (values[:, 0] > bound[:, 0]) | (growth == GROWTH)
-        inverse = np.where(values > bound, 1.0 / np.where(values > bound, values, 1.0), 0.0)
-        target = wanted[remaining] * _ISOMETRIC
-        coefficient = np.einsum(
-            "nq,nqi,ni,npi,nkp->nk", target, vectors, inverse, vectors, rows, optimize=True
-        )
-        coefficient /= np.where(valid, norm, 1.0)
-        edge, member = np.nonzero(valid & done[:, None])
-        edges.append(remaining[edge])
-        hinges.append(hinge.reshape(count, -1)[edge, member])
-        weights.append(coefficient[edge, member])
-        if done.all():
-            break
-        remaining, patches = remaining[~done], patches.grown(~done)
-    entries = (np.concatenate(weights), (np.concatenate(edges), np.concatenate(hinges)))
-    return csr_array(entries, shape=(len(wanted), num_hinges))
-
-
 def _products(u: Array, v: Array) -> Array:
     """u^T K v as rows over (K11, K22, K12)."""
     return np.stack(
@@ -198,12 +130,3 @@ def _rows(alpha: Array, frame: Array) -> Array:
     n, t = frame[..., 0, :], frame[..., 1, :]
     basis = np.stack([_products(n, n), _products(n, t), _products(t, t)], axis=-2)
     return (alpha[..., None, :] @ basis)[..., 0, :]
-
-
-def _turned(rows: Array, angle: Array) -> Array:
-    """Rows over a tensor's components in frames turned by `angle`, as rows over those in the fixed frame."""
-    u = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    v = np.stack([-u[..., 1], u[..., 0]], axis=-1)
-    return (
-        rows[..., :1] * _products(u, u) + rows[..., 1:2] * _products(v, v) + rows[..., 2:] * _products(u, v)
-    )
