@@ -81,12 +81,9 @@ def place_after(mesh: SewnMesh, p: int, q: int) -> wp.vec3d:
 
 
 @wp.func
-def fan_may_follow(
-    mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, moved: wp.float64, least: wp.float64
-) -> bool:
-    """Whether the faces around the panel vertex p may have q in its place: upright, of a quality of at least
-    `least` in the metric or as before, their edges within ROOM_TO_GROW, and in the world clear of everything
-    and little turned."""
+def fan_fits(mesh: SewnMesh, p: int, q: int, least: wp.float64) -> bool:
+    """Whether the faces around the panel vertex p may have q in its place, as far as panel space goes: their
+    edges within ROOM_TO_GROW, UPRIGHT, and of a quality of at least `least` in the metric, or as before."""
     panels = mesh.panels
     first = panels.leaving[p]
     h = first
@@ -99,22 +96,41 @@ def fan_may_follow(
             return False
         if i != q and j != q:
             m = panels.metric[q] + panels.metric[i] + panels.metric[j]
-            before = quality(panels.point[p], panels.point[i], panels.point[j], m)
             after = quality(panels.point[q], panels.point[i], panels.point[j], m)
-            if (after < least and after < before) or after <= UPRIGHT:
+            if after <= UPRIGHT:
                 return False
-            x = mesh.x[mesh.vertex[q]]
+            if after < least and after < quality(panels.point[p], panels.point[i], panels.point[j], m):
+                return False
+        h = around(panels, h)
+        if h < 0 or h == first:
+            break
+    return True
+
+
+@wp.func
+def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, moved: wp.float64) -> bool:
+    """Whether, in the world, the faces around p with q in its place turn little and keep clear of everything,
+    where the surface moves by `moved`."""
+    panels = mesh.panels
+    if moved <= FLAT:
+        return True
+    first = panels.leaving[p]
+    h = first
+    x = mesh.x[mesh.vertex[q]]
+    gone = wp.vec2i(-1 - mesh.vertex[p], -1)
+    while True:
+        i = head(panels, h)
+        j = apex(panels, h)
+        if i != q and j != q:
             xi = mesh.x[mesh.vertex[i]]
             xj = mesh.x[mesh.vertex[j]]
-            if moved > FLAT:
-                if not turns_little(normal(mesh.x[mesh.vertex[p]], xi, xj), normal(x, xi, xj)):
-                    return False
-                gone = wp.vec2i(-1 - mesh.vertex[p], -1)
-                if crosses(mesh, mesh.vertex[q], mesh.vertex[i], mesh.vertex[j], gone):
-                    return False
-                place = place_of(mesh, q, i, j, panels.panel[h / 3])
-                if not is_clear(surroundings, x, xi, xj, place, moved):
-                    return False
+            if not turns_little(normal(mesh.x[mesh.vertex[p]], xi, xj), normal(x, xi, xj)):
+                return False
+            if crosses(mesh, mesh.vertex[q], mesh.vertex[i], mesh.vertex[j], gone):
+                return False
+            place = place_of(mesh, q, i, j, panels.panel[h / 3])
+            if not is_clear(surroundings, x, xi, xj, place, moved):
+                return False
         h = around(panels, h)
         if h < 0 or h == first:
             break
@@ -202,20 +218,23 @@ def collapse_if_fine(mesh: SewnMesh, surroundings: Surroundings, h: int, p: int,
         if panels.corner[g] != p2 and head(panels, g) != p2:
             return False
         q2 = other_end(panels, g, p2)
-    if not collapse_is_manifold(panels, h, p) or not keeps_sewn_manifold(mesh, p, w, h):
-        return False
+    # What costs least is asked first.
     if panels.on_rim[p] != 0 and not is_straight(panels, p, q):
+        return False
+    if not fan_fits(mesh, p, q, least):
+        return False
+    if not collapse_is_manifold(panels, h, p) or not keeps_sewn_manifold(mesh, p, w, h):
         return False
     moved = wp.length(place_after(mesh, p, q) - mesh.x[v])
     if g >= 0:
+        if not is_straight(panels, p2, q2) or not fan_fits(mesh, p2, q2, least):
+            return False
         if not collapse_is_manifold(panels, g, p2) or not keeps_sewn_manifold(mesh, p2, w, g):
             return False
-        if not is_straight(panels, p2, q2):
-            return False
         moved = wp.max(moved, wp.length(place_after(mesh, p2, q2) - mesh.x[v]))
-    if not fan_may_follow(mesh, surroundings, p, q, moved, least):
+    if not fan_is_clear(mesh, surroundings, p, q, moved):
         return False
-    if g >= 0 and not fan_may_follow(mesh, surroundings, p2, q2, moved, least):
+    if g >= 0 and not fan_is_clear(mesh, surroundings, p2, q2, moved):
         return False
     mesh.clock[0] += 1
     touch(mesh, w)
