@@ -97,6 +97,23 @@ def remesh(
 
 
 @app.command()
+def transfer(
+    source: Annotated[Path, typer.Argument(help="A dataset of one sample, or the folder of a sample.")],
+    out: Out = OUT / "transfer",
+    sizes: Annotated[str, typer.Option(help="Vertices of the targets, about.")] = "1400,3600,17000",
+    seeds: Annotated[int, typer.Option(min=1, help="Topologies of each size.")] = 3,
+) -> None:
+    """What a drape loses on its way to other topologies; write transfer.md and transfer.json."""
+    from benchmarks.transfer import table, transfers
+
+    given, found = transfers(source, [int(size) for size in sizes.split(",")], seeds, typer.echo)
+    text = table(given, found)
+    _write(out / "transfer.json", [asdict(row) for row in found])
+    (out / "transfer.md").write_text(text, encoding="utf-8")
+    typer.echo(text)
+
+
+@app.command()
 def drape(
     out: Out = OUT,
     neighbours: Annotated[int, typer.Option(min=0, help="Drapes that start from the one before.")] = 4,

@@ -42,7 +42,7 @@ def test_a_coarse_sheet_over_a_sphere_is_freed() -> None:
     assert 0.0 < moved.max() < 0.004, "a chord of 6 cm is 2.3 mm inside the sphere"
     # What hangs well below the equator touches nothing, and is left where it was, to the bit.
     below = made.positions[:, 1] < -0.08
-    assert below.sum() > 50
+    assert below.sum() > 30
     np.testing.assert_array_equal(free.positions[below], made.positions[below])
     np.testing.assert_array_equal(free.mesh.panel_vertices, made.mesh.panel_vertices)
 

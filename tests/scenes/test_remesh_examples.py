@@ -1,0 +1,53 @@
+"""The examples of scenes/remesh/ as they stand there, on a drape so coarse that it takes seconds."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from muslin.garments.obj import read_garment
+from muslin.sim.dataset.intersections import count_intersections
+from muslin.sim.dataset.reader import open_dataset
+
+ROOT = Path(__file__).resolve().parents[2]
+REDUCED = ("--set", "garment.edge_length=0.065", "--set", "solver.settle_steps=6", "--set", "solver.dt=0.034")
+
+
+def run(script: str, *arguments: str) -> list[str]:
+    """The lines that an example prints."""
+    binaries = Path(sys.executable).parent
+    environment = os.environ | {"PATH": f"{binaries}{os.pathsep}{os.environ['PATH']}"}
+    command = ["sh", f"scenes/remesh/{script}", *arguments, *REDUCED]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("script", "arguments", "areas"),
+    [
+        ("phi.sh", (), {"uniform": 5e-4, "front": None, "folds": 5e-4}),
+        ("topologies.sh", ("3",), {f"long_dress_{seed}": 5e-4 for seed in range(3)}),
+    ],
+)
+def test_example(script: str, arguments: tuple[str, ...], areas: dict[str, float | None], tmp_path: Path):
+    lines = run(script, str(tmp_path), *arguments)
+    assert len(lines) == 1 + len(areas)
+    sample = open_dataset(tmp_path / "drape")[0]
+    body = sample.body_vertices(0), np.delete(sample.body_faces, sample.masked(0), axis=0)
+    assert {path.stem for path in tmp_path.glob("*.obj")} == set(areas)
+    faces = []
+    for name, area in areas.items():
+        mesh, positions = read_garment(tmp_path / f"{name}.obj")
+        assert positions is not None
+        counts = count_intersections(positions, mesh.faces, *body)
+        assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)
+        if area is not None:
+            assert mesh.face_areas.mean() == pytest.approx(area, rel=0.01)
+        faces.append(mesh.panel_faces.tobytes())
+    assert len(set(faces)) == len(areas)
