@@ -114,6 +114,24 @@ def transfer(
 
 
 @app.command()
+def reach(
+    out: Out = OUT / "reach",
+    presets: Annotated[str, typer.Option(help="Presets of the tee.")] = (
+        "top,tshirt,sweater,short_dress,long_dress"
+    ),
+    vertices: Annotated[str, typer.Option(help="Of the targets, about.")] = "200,700,1400,3600",
+    distortions: Annotated[str, typer.Option(help="Largest ones to ask for.")] = "2.5,2.2,2.1,2.0,1.9",
+    seeds: Annotated[int, typer.Option(min=1, help="Draws of each preset.")] = 6,
+) -> None:
+    """Which largest distortion triangulations reach; write reach.json."""
+    from benchmarks.reach import reach as reached
+
+    sizes, asked = [int(n) for n in vertices.split(",")], [float(d) for d in distortions.split(",")]
+    found = reached(presets.split(","), sizes, asked, seeds, typer.echo)
+    _write(out / "reach.json", [asdict(row) for row in found])
+
+
+@app.command()
 def drape(
     out: Out = OUT,
     neighbours: Annotated[int, typer.Option(min=0, help="Drapes that start from the one before.")] = 4,

@@ -7,7 +7,7 @@ set -eu
 out=$1
 shift
 
-muslin simulate scenes/remesh/long_dress.toml --out "$out/drape" "$@"
+[ -d "$out/drape" ] || muslin simulate scenes/remesh/long_dress.toml --out "$out/drape" "$@"
 
 muslin remesh "$out/drape" --target-area 5e-4 --max-distortion 2.2 --out "$out/uniform.obj"
 muslin remesh "$out/drape" --target-area 8e-4 --panel-area front=3e-4 --out "$out/front.obj"

@@ -8,6 +8,6 @@ out=$1
 count=$2
 shift 2
 
-muslin simulate scenes/remesh/long_dress.toml --out "$out/drape" "$@"
+[ -d "$out/drape" ] || muslin simulate scenes/remesh/long_dress.toml --out "$out/drape" "$@"
 
 muslin remesh "$out/drape" --target-area 5e-4 --topologies "$count" --binding --out "$out/long_dress.obj"
