@@ -10,7 +10,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.remesh.edge_collapse import collapse_if_fine
 from muslin.sim.remesh.edge_flip import flip_if_better
 from muslin.sim.remesh.edge_split import size_squared, split_edge
-from muslin.sim.remesh.metric import area_density
+from muslin.sim.remesh.metric import area_density, edge_lengths
 from muslin.sim.remesh.obstacle import Obstacle
 from muslin.sim.remesh.panel_mesh import DEAD, PanelMesh, apex, head
 from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload, was_refused
@@ -151,11 +151,13 @@ def adapt(
     edges are collapsed as long as the new ones stay within 0.9 and triangles of a fair shape. Splits leave
     the surface as it is; flips and collapses, which change it, are made where they keep clear of the cloth
     and the obstacle. Panel space, mass and linear momentum stay; so do corners, curved boundaries and what is
-    locked. Returns the garment, the number (V',) that each of its vertices had, or -1, and what was done.
+    locked. Edges between two PINNED vertices stay too: the metric at their ends is lowered until they are
+    within it. Returns the garment, the number (V',) that each of its vertices had, or -1, and what was done.
 
     Raises InputError if the metric asks for more vertices than make sense.
     """
     mesh = state.mesh
+    metric = _within_led_edges(state, metric)
     density = mesh.face_areas * area_density(metric[mesh.panel_faces].mean(axis=1))
     asked = 0.5 * float(density.sum()) / EQUILATERAL
     room = int(SPARE * max(asked, len(mesh.panel_vertices))) + 256
@@ -186,3 +188,18 @@ def adapt(
             f"remesh: more than {room} vertices are not enough for the sizing field; raise size_min"
         )
     return *unload(sewn, state), Changes(splits, flips, collapses)
+
+
+def _within_led_edges(state: GarmentState, metric: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The metric (P, 2, 2), scaled at the ends of edges between PINNED vertices until these are of size <= 1.
+
+    Such an edge is not split, so a face at it keeps a side of half its size: splits towards a longer one
+    would never end.
+    """
+    faces = state.mesh.panel_faces
+    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    led = half[(state.locked[state.mesh.panel_to_vertex[half]] == int(PINNED)).all(axis=1)]
+    sizes = np.maximum(edge_lengths(state.mesh.panel_vertices, led, metric), 1.0)
+    largest = np.ones(len(metric))
+    np.maximum.at(largest, led.ravel(), np.repeat(sizes, 2))
+    return metric / (largest**2)[:, None, None]

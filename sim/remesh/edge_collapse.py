@@ -211,6 +211,9 @@ def collapse_if_fine(mesh: SewnMesh, surroundings: Surroundings, h: int, p: int,
     g = int(-1)
     p2 = mesh.next_copy[p]
     q2 = int(-1)
+    if p2 == p and t <= -2:
+        # The tip of a dart, on both sides of its seam at once.
+        return False
     if p2 != p:
         if t > -2 or mesh.next_copy[p2] != p:
             return False

@@ -11,7 +11,7 @@ from muslin.sim.remesh.local_crossing import crosses, normal, place_of
 from muslin.sim.remesh.operations import can_flip, flip
 from muslin.sim.remesh.panel_mesh import apex
 from muslin.sim.remesh.passes import is_illegal, squared_length
-from muslin.sim.remesh.sewn_mesh import SewnMesh, are_joined, touch
+from muslin.sim.remesh.sewn_mesh import PINNED, SewnMesh, are_joined, touch
 from muslin.sim.remesh.surroundings import Surroundings, is_clear, turns_little
 
 wp.set_module_options({"enable_backward": False})
@@ -38,6 +38,9 @@ def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
     vc = mesh.vertex[c]
     vd = mesh.vertex[d]
     if vc == vd or are_joined(mesh, vc, vd):
+        return False
+    if mesh.locked[vc] == PINNED and mesh.locked[vd] == PINNED:
+        # It could not be split any more.
         return False
     xa = mesh.x[va]
     xb = mesh.x[vb]
