@@ -60,3 +60,20 @@ def tube(circumference: float, height: float, around: int, rows: int) -> Garment
     sewn = np.arange(len(points))
     sewn[around * (rows + 1) :] = np.arange(rows + 1)
     return one_panel(points, faces, sewn.astype(np.int32))
+
+
+def dart(radius: float, opening: float, around: int, rings: int) -> GarmentMesh:
+    """A disk without a wedge of `opening` radians, whose two straight edges are sewn: a dart, its tip in the
+    middle, one panel vertex that the seam ends at."""
+    angle = np.linspace(0.0, 2.0 * np.pi - opening, around + 1)
+    ring = radius * np.arange(1, rings + 1) / rings
+    points = ring[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    row, column = (index.ravel() for index in np.meshgrid(np.arange(rings - 1), np.arange(around)))
+    a = 1 + row * (around + 1) + column
+    b, c, d = a + 1, a + around + 1, a + around + 2
+    fan = np.stack([np.zeros(around, int), np.arange(1, around + 1), np.arange(2, around + 2)], 1)
+    faces = np.concatenate([fan, np.stack([a, c, d], 1), np.stack([a, d, b], 1)]).astype(np.int32)
+    sewn = np.zeros(1 + rings * (around + 1), dtype=np.int64)
+    place = np.minimum(np.arange(around + 1) % around, around)
+    sewn[1:] = (1 + np.arange(rings)[:, None] * around + place).ravel()
+    return one_panel(np.vstack([[[0.0, 0.0]], points.reshape(-1, 2)]), faces, sewn.astype(np.int32))
