@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from muslin.sim.solve.rest_forces import force_residual
 from muslin.sim.solve.simulator import ClothSimulator
 
 SWING_STEP = 1.0 / 30.0
@@ -69,7 +70,7 @@ def settle(
                 tick()
     finally:
         sim.settings = usual
-    return RestReport(steps, moved, sim.force_residual(LONGEST), still >= STILL_STEPS)
+    return RestReport(steps, moved, force_residual(sim, LONGEST), still >= STILL_STEPS)
 
 
 def _swing(

@@ -10,6 +10,7 @@ from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.relax import measured_step
 from muslin.sim.solve.errors import SimulationError
+from muslin.sim.solve.rest_forces import force_residual
 from muslin.sim.solve.settings import SolverSettings
 from muslin.sim.solve.simulator import ClothSimulator
 
@@ -71,7 +72,7 @@ def balance(sim: ClothSimulator, residual: float, dt: float, max_steps: int = 20
     left = np.inf
     for step in range(1, max_steps + 1):
         sim.advance(None, dt, inertia=False, friction=False)
-        left = sim.force_residual(dt)
+        left = force_residual(sim, dt)
         if left <= residual:
             return step
     raise SimulationError(

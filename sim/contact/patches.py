@@ -13,6 +13,8 @@ from scipy.sparse.csgraph import connected_components
 
 from muslin.sim.cloth import ClothModel
 
+Integers = NDArray[np.signedinteger[Any]]
+
 PATCH_SIZE = 48
 """Vertices that a patch has at most: so many move nearly as one."""
 
@@ -49,27 +51,47 @@ class Patches:
         return len(self.groups) - 1
 
 
-def cut_into_patches(
-    points: NDArray[np.float64], cloth: ClothModel, collider_faces: NDArray[np.int32]
+def cut_cloth(points: NDArray[np.float64], cloth: ClothModel) -> Patches:
+    """Patches of a cloth at `points` (V, 3)."""
+    return _cut(points, cloth.edges, cloth.faces)
+
+
+def cut_collider(points: NDArray[np.float64], faces: NDArray[np.int32]) -> Patches | None:
+    """Patches of a collider at `points` (N, 3); None if it has no faces."""
+    return _cut(points, igl.edges(faces.astype(np.int64)), faces) if len(faces) else None
+
+
+def joined(cloth: Patches, collider: Patches | None, num_vertices: int) -> Patches:
+    """Patches of a cloth of so many vertices, then those of a collider, whose vertices follow."""
+    if collider is None:
+        return cloth
+
+    def both(name: str) -> Rows:
+        return _after(getattr(cloth, name), getattr(collider, name), num_vertices)
+
+    return Patches(
+        num_cloth=cloth.num_cloth,
+        groups=np.concatenate([cloth.groups, collider.groups[1:] + cloth.groups[-1]]),
+        vertices=both("vertices"),
+        edges=both("edges"),
+        faces=both("faces"),
+        touched_by_patch=both("touched_by_patch"),
+        touched_by_group=both("touched_by_group"),
+    )
+
+
+def _cut(
+    points: NDArray[np.float64], edges: NDArray[np.signedinteger[Any]], faces: NDArray[np.int32]
 ) -> Patches:
-    """Patches of the joint vertices `points` (V + N, 3): the cloth's, then those of a collider with faces."""
-    n = cloth.num_vertices
-    edges, faces = cloth.edges, cloth.faces
-    pieces = _pieces(n, faces)
-    if len(collider_faces):
-        edges = np.concatenate([edges, igl.edges(collider_faces.astype(np.int64)) + n])
-        faces = np.concatenate([faces, collider_faces + n])
-        pieces = np.concatenate([pieces, pieces.max() + 1 + _pieces(len(points) - n, collider_faces)])
-    patch = _bisect(points[: len(pieces)], pieces, PATCH_SIZE)
-    group = _bisect(points[: len(pieces)], patch, GROUP_SIZE)
-    vertices = np.arange(len(pieces))[:, None]
+    patch = _bisect(points, _pieces(len(points), faces), PATCH_SIZE)
+    group = _bisect(points, patch, GROUP_SIZE)
     num_patches, num_groups = int(patch.max()) + 1, int(group.max()) + 1
     patch_of_group = np.zeros(num_groups, np.int64)
     patch_of_group[group] = patch
     return Patches(
-        num_cloth=int(patch[:n].max()) + 1,
+        num_cloth=num_patches,
         groups=np.searchsorted(patch_of_group, np.arange(num_patches + 1)).astype(np.int32),
-        vertices=_in_order(vertices, group, num_groups),
+        vertices=_in_order(np.arange(len(points))[:, None], group, num_groups),
         edges=_in_order(edges, group[edges[:, 0]], num_groups),
         faces=_in_order(faces, group[faces[:, 0]], num_groups),
         touched_by_patch=_touched(patch, edges, faces),
@@ -77,7 +99,15 @@ def cut_into_patches(
     )
 
 
-def _touched(sets: NDArray[np.int64], edges: NDArray[np.int32], faces: NDArray[np.int32]) -> Rows:
+def _after(first: Rows, second: Rows, num_vertices: int) -> Rows:
+    """Rows of sets, then of sets over vertices that are numbered after so many."""
+    rows = np.concatenate([first.rows, second.rows + np.int32(num_vertices)])
+    return Rows(rows, np.concatenate([first.offsets, second.offsets[1:] + first.offsets[-1]]))
+
+
+def _touched(
+    sets: NDArray[np.int64], edges: NDArray[np.signedinteger[Any]], faces: NDArray[np.int32]
+) -> Rows:
     """The vertices of each set, and those of its edges and faces."""
     count = len(sets)
     reached = [sets[rows[:, 0]] * count + ends for rows in (edges, faces) for ends in rows.T]
@@ -86,7 +116,7 @@ def _touched(sets: NDArray[np.int64], edges: NDArray[np.int32], faces: NDArray[n
     return _in_order((both % count)[:, None], both // count, int(sets.max()) + 1)
 
 
-def _in_order(rows: NDArray[np.signedinteger[Any]], sets: NDArray[np.int64], count: int) -> Rows:
+def _in_order(rows: Integers, sets: NDArray[np.int64], count: int) -> Rows:
     order = np.argsort(sets, kind="stable")
     offsets = np.searchsorted(sets[order], np.arange(count + 1))
     return Rows(rows[order].astype(np.int32), offsets.astype(np.int32))

@@ -17,7 +17,7 @@ from muslin.sim.contact.broad_phase import (
 from muslin.sim.contact.narrow_phase import GroupPrimitives, find_near_edges, find_near_faces
 from muslin.sim.contact.pair_list import PairList
 from muslin.sim.contact.patch_motion import SetMotion, find_hot_pairs, split_motions
-from muslin.sim.contact.patches import Patches, Rows, cut_into_patches
+from muslin.sim.contact.patches import Patches, Rows, cut_cloth, cut_collider, joined
 
 AHEAD = 0.005
 """Metres beyond the range within which patches are opened before they must be."""
@@ -101,11 +101,15 @@ class PairSearch:
         range_: float,
         margin: float,
         device: str,
+        collider: Patches | None = None,
     ) -> None:
+        """`collider`: its patches, if they are known."""
         self.device = device
         self.range = range_
         self.margin = margin
-        cut = cut_into_patches(points, cloth, collider_faces)
+        n = cloth.num_vertices
+        self.collider = cut_collider(points[n:], collider_faces) if collider is None else collider
+        cut = joined(cut_cloth(points[:n], cloth), self.collider, n)
         self._patches = _Sets(cut.touched_by_patch, device)
         self._groups = _Sets(cut.touched_by_group, device)
         self._group_offsets = _integers(cut.groups, device)
@@ -119,7 +123,6 @@ class PairSearch:
         self._spent = False
         self._whole = wp.full(len(points), 1.0, dtype=wp.float64, device=device)
         self.still = wp.zeros(len(points), dtype=wp.vec3d, device=device)
-        n = cloth.num_vertices
         self.lists = [PairList(False, 8 * n, device), PairList(True, 16 * n, device)]
 
     def renew(self, x: wp.array) -> None:

@@ -27,6 +27,7 @@ from muslin.sim.contact.friction import (
     share_bristles,
 )
 from muslin.sim.contact.pair_list import PairList
+from muslin.sim.contact.patches import Patches
 from muslin.sim.contact.search import PairSearch
 from muslin.sim.solve.block_matrix import BlockMatrix
 
@@ -64,13 +65,16 @@ class ContactSystem:
         points: NDArray[np.float64],
         settings: ContactSettings,
         device: str,
+        collider: Patches | None = None,
     ) -> None:
+        """`collider`: its patches, if they are known from another cloth's contacts."""
         self.settings = settings
         self.device = device
         self.num_cloth = cloth.num_vertices
         n = len(points)
         self.collider_faces = collider_faces
-        self.search = PairSearch(cloth, collider_faces, points, settings.range, settings.margin, device)
+        distances = (settings.range, settings.margin)
+        self.search = PairSearch(cloth, collider_faces, points, *distances, device, collider)
         self.measure = PairMeasure()
         self.measure.vertex_area = wp.array(cloth.vertex_area, dtype=wp.float64, device=device)
         self.measure.num_cloth = self.num_cloth

@@ -33,3 +33,20 @@ class SimulationError(Exception):
     def __init__(self, message: str, state: LastState | None = None) -> None:
         super().__init__(message)
         self.state = state
+
+
+def blocked(share: float, halvings: int, tightest: str) -> SimulationError:
+    """The error of a step in which collider and pins still have this `share` of their way to go."""
+    return SimulationError(
+        f"collider and pins cannot go on without touching the cloth: {share:.0%} of the way is left "
+        f"after {halvings} halvings of the step; closest are {tightest}; "
+        "use a smaller time step, a looser garment or a slower motion"
+    )
+
+
+def out_of_budget(tightest: str) -> SimulationError:
+    """The error of a step that needs more Newton iterations than it may spend."""
+    return SimulationError(
+        f"the budget of Newton iterations is spent; closest are {tightest}; use a larger budget "
+        "(solver.max_work), a smaller time step or a slower motion"
+    )

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from muslin.sim.air import AirDrag
 from muslin.sim.cloth import ClothModel
 from muslin.sim.contact.carry import Carry
+from muslin.sim.contact.patches import Patches
 from muslin.sim.contact.system import ContactSettings, ContactSystem
 from muslin.sim.contact.yielding import yield_to_cloth
 from muslin.sim.elastic import ElasticEnergy
-from muslin.sim.solve.errors import SimulationError
+from muslin.sim.solve.errors import SimulationError, blocked, out_of_budget
 from muslin.sim.solve.inertia import quadratic_gradient, quadratic_value, step_along
 from muslin.sim.solve.linear import LinearSystem
 from muslin.sim.solve.settings import SolverSettings, StepReport
@@ -60,18 +61,22 @@ class ClothSimulator:
         self._wear(cloth, np.concatenate([positions, collider_vertices]), collider_faces)
 
     def _wear(
-        self, cloth: ClothModel, points: NDArray[np.float64], collider_faces: NDArray[np.int32]
+        self,
+        cloth: ClothModel,
+        points: NDArray[np.float64],
+        collider_faces: NDArray[np.int32],
+        collider: Patches | None = None,
     ) -> None:
         """Make all that depends on the cloth, at rest and without pins at `points` (V + N, 3)."""
         self.cloth = cloth
-        n, total, device = cloth.num_vertices, len(points), self.device
+        n, device = cloth.num_vertices, self.device
         self.elastic = ElasticEnergy(cloth, device, self.settings.damping)
         self.air = None if self.settings.air is None else AirDrag(cloth, self.settings.air, device)
-        self.contact = ContactSystem(cloth, collider_faces, points, self._contact_settings, device)
+        self.contact = ContactSystem(cloth, collider_faces, points, self._contact_settings, device, collider)
         self.linear = LinearSystem(cloth, device)
         self.x = wp.array(points, dtype=wp.vec3d, device=device)
         self.start, self.trial, self.p, self.remaining, self.base, self.uncut = (
-            wp.zeros(total, dtype=wp.vec3d, device=device) for _ in range(6)
+            wp.zeros(len(points), dtype=wp.vec3d, device=device) for _ in range(6)
         )
         self.target, self.gradient = (wp.zeros(n, dtype=wp.vec3d, device=device) for _ in range(2))
         self.weight = wp.zeros(n, dtype=wp.float64, device=device)
@@ -122,19 +127,6 @@ class ClothSimulator:
             raise
         return report
 
-    def force_residual(self, dt: float) -> float:
-        """Norm of the net force left on the cloth at rest, as a share of its weight.
-
-        Elastic, contact and gravity forces, and friction as it stood at the start of the last step of `dt`
-        seconds; no inertia.
-        """
-        force = np.linalg.norm(self._forces_at_rest(dt)[~self.pins])
-        return float(force / (self.cloth.mass.sum() * np.linalg.norm(self.settings.gravity) + 1e-300))
-
-    def pin_forces(self, dt: float) -> NDArray[np.float64]:
-        """Force (P, 3), N, with which each pinned vertex, in their order, holds the cloth at rest."""
-        return -self._forces_at_rest(dt)[self.pins]
-
     def set_gravity(self, gravity: tuple[float, float, float]) -> None:
         """Acceleration of gravity from now on, m/s^2."""
         self._gravity = wp.vec3d(*gravity)
@@ -154,7 +146,7 @@ class ClothSimulator:
         """Go on with another mesh of the same cloth: (V', 3) positions, m, velocities, m/s, and what friction
         holds, m. Nothing is pinned then."""
         points = np.concatenate([positions, self.collider_vertices])
-        self._wear(cloth, points, self.contact.collider_faces)
+        self._wear(cloth, points, self.contact.collider_faces, self.contact.search.collider)
         self.velocity = velocity.copy()
         self.contact.friction.bristle.assign(held)
 
@@ -188,14 +180,8 @@ class ClothSimulator:
             return
         if splits == 0:
             led = self._led()
-            left, way = (np.linalg.norm((goal - x)[led]) for x in (self.x.numpy(), saved_x))
-            share = left / way
-            raise SimulationError(
-                f"collider and pins cannot go on without touching the cloth: {share:.0%} of the way is left "
-                f"after {self.settings.max_splits} halvings of the step; "
-                f"closest are {self.contact.tightest(self.x)}; "
-                "use a smaller time step, a looser garment or a slower motion"
-            )
+            left, way = (float(np.linalg.norm((goal - x)[led])) for x in (self.x.numpy(), saved_x))
+            raise blocked(left / way, self.settings.max_splits, self.contact.tightest(self.x))
         self.restore(saved_x, saved_v)
         report.splits += 1
         middle = 0.5 * (saved_x + goal)
@@ -290,10 +276,8 @@ class ClothSimulator:
         return safe
 
     def _relax(self, led: NDArray[np.bool_], dt: float, report: StepReport) -> tuple[float, float]:
-        """One Newton iteration with collider and pins where they are.
-
-        Returns the largest move that it asks for and the share of it that was made.
-        """
+        """One Newton iteration with collider and pins where they are: the largest move that it asks for, and the
+        share of it that was made."""
         self.remaining.zero_()
         self._assemble(1.0 / dt)
         size, limit = self._direction(None, led, report)
@@ -316,11 +300,7 @@ class ClothSimulator:
         s = self.settings
         n = self.cloth.num_vertices
         if self.work_left <= 0:
-            raise SimulationError(
-                "the budget of Newton iterations is spent; closest are "
-                f"{self.contact.tightest(self.x)}; use a larger budget (solver.max_work), a smaller time "
-                "step or a slower motion"
-            )
+            raise out_of_budget(self.contact.tightest(self.x))
         self.work_left -= 1
         # Where cloth is squeezed, a better direction saves attempts.
         tolerance = s.linear_tolerance * (1.0 if told is None else 0.1)
@@ -353,8 +333,9 @@ class ClothSimulator:
         self.weight.assign(weight)
         self.target.assign(target)
 
-    def _forces_at_rest(self, dt: float) -> NDArray[np.float64]:
-        """(V, 3) forces without inertia, N."""
+    def forces_at_rest(self, dt: float) -> NDArray[np.float64]:
+        """(V, 3) forces on the cloth if it stood still, N: elastic, contact and gravity, and friction as it
+        stood at the start of the last step of `dt` seconds; no inertia."""
         saved = self.weight.numpy().copy()
         self.weight.zero_()
         self.remaining.zero_()

@@ -6,7 +6,7 @@ import warp as wp
 
 from muslin.sim.cloth import build_cloth, merge_cloths
 from muslin.sim.contact.patch_motion import SetMotion, approach, split_motions
-from muslin.sim.contact.patches import GROUP_SIZE, PATCH_SIZE, cut_into_patches
+from muslin.sim.contact.patches import GROUP_SIZE, PATCH_SIZE, cut_cloth, cut_collider, joined
 from muslin.sim.material import load_fabric
 
 
@@ -28,7 +28,7 @@ def layers(grid_mesh):
 
 def test_every_primitive_is_in_one_group_and_touched_by_its_set(layers):
     points, cloth, faces = layers
-    patches = cut_into_patches(points, cloth, faces)
+    patches = _cut(points, cloth, faces)
     joint = np.concatenate([cloth.faces, faces + cloth.num_vertices])
     for rows, expected in (
         (patches.vertices.rows, np.arange(len(points))[:, None]),
@@ -49,7 +49,7 @@ def test_every_primitive_is_in_one_group_and_touched_by_its_set(layers):
 
 def test_layers_and_collider_share_no_patch(layers):
     points, cloth, faces = layers
-    patches = cut_into_patches(points, cloth, faces)
+    patches = _cut(points, cloth, faces)
     heights = [points[_rows(patches.touched_by_patch, k)[:, 0], 1] for k in range(patches.count)]
     assert all(np.ptp(height) == 0.0 for height in heights)
     assert all((height >= 0.0).all() for height in heights[: patches.num_cloth])
@@ -60,7 +60,7 @@ def test_pieces_smaller_than_a_patch_go_together(flat_mesh):
     draw = np.random.default_rng(3)
     faces = np.arange(90, dtype=np.int32).reshape(-1, 3)
     cloth = build_cloth(flat_mesh(draw.uniform(size=(90, 2)), faces), load_fabric("gray-interlock"))
-    patches = cut_into_patches(draw.uniform(size=(90, 3)), cloth, faces[:0])
+    patches = _cut(draw.uniform(size=(90, 3)), cloth, faces[:0])
     assert patches.count <= 90 // (PATCH_SIZE // 2)
 
 
@@ -123,3 +123,8 @@ def measured_approach(points: np.ndarray, moves: np.ndarray) -> float:
     out = wp.zeros(1, dtype=wp.float64, device="cpu")
     wp.launch(approach_of_two, 1, [motion, out], device="cpu")
     return float(out.numpy()[0])
+
+
+def _cut(points, cloth, collider_faces):
+    n = cloth.num_vertices
+    return joined(cut_cloth(points[:n], cloth), cut_collider(points[n:], collider_faces), n)
