@@ -276,8 +276,8 @@ class ClothSimulator:
         return safe
 
     def _relax(self, led: NDArray[np.bool_], dt: float, report: StepReport) -> tuple[float, float]:
-        """One Newton iteration with collider and pins where they are: the largest move that it asks for, and the
-        share of it that was made."""
+        """One Newton iteration with collider and pins where they are: the largest move that it asks for, and
+        the share of it that was made."""
         self.remaining.zero_()
         self._assemble(1.0 / dt)
         size, limit = self._direction(None, led, report)
