@@ -81,6 +81,43 @@ def place_after(mesh: SewnMesh, p: int, q: int) -> wp.vec3d:
 
 
 @wp.func
+def surface_moves(mesh: SewnMesh, p: int, q: int) -> wp.float64:
+    """How far the surface of one panel moves at most when p goes onto q: at p, or where a new edge at q
+    crosses an old one at p in panel space, for in between the change is linear."""
+    panels = mesh.panels
+    none = wp.float64(0.0)
+    one = wp.float64(1.0)
+    xp = mesh.x[mesh.vertex[p]]
+    xq = mesh.x[mesh.vertex[q]]
+    largest = wp.length(place_after(mesh, p, q) - xp)
+    to_q = panels.point[q] - panels.point[p]
+    first = panels.leaving[p]
+    g = first
+    while True:
+        j = head(panels, g)
+        new = panels.point[j] - panels.point[q]
+        h = first
+        while j != q:
+            i = head(panels, h)
+            old = panels.point[i] - panels.point[p]
+            cross = old[0] * new[1] - old[1] * new[0]
+            if i != q and i != j and cross != none:
+                s = (to_q[0] * new[1] - to_q[1] * new[0]) / cross
+                r = (to_q[0] * old[1] - to_q[1] * old[0]) / cross
+                if s > none and s < one and r > none and r < one:
+                    xi = mesh.x[mesh.vertex[i]]
+                    xj = mesh.x[mesh.vertex[j]]
+                    largest = wp.max(largest, wp.length(xp + (xi - xp) * s - xq - (xj - xq) * r))
+            h = around(panels, h)
+            if h < 0 or h == first:
+                break
+        g = around(panels, g)
+        if g < 0 or g == first:
+            break
+    return largest
+
+
+@wp.func
 def fan_fits(mesh: SewnMesh, p: int, q: int, least: wp.float64) -> bool:
     """Whether the faces around the panel vertex p may have q in its place, as far as panel space goes: their
     edges within ROOM_TO_GROW, UPRIGHT, and of a quality of at least `least` in the metric, or as before."""
@@ -108,12 +145,10 @@ def fan_fits(mesh: SewnMesh, p: int, q: int, least: wp.float64) -> bool:
 
 
 @wp.func
-def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, moved: wp.float64) -> bool:
+def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, drift: wp.float64) -> bool:
     """Whether, in the world, the faces around p with q in its place turn little and keep clear of everything,
-    where the surface moves by `moved`."""
+    where they are within `drift` of the surface as it was loaded."""
     panels = mesh.panels
-    if moved <= FLAT:
-        return True
     first = panels.leaving[p]
     h = first
     x = mesh.x[mesh.vertex[q]]
@@ -129,7 +164,7 @@ def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, mov
             if crosses(mesh, mesh.vertex[q], mesh.vertex[i], mesh.vertex[j], gone):
                 return False
             place = place_of(mesh, q, i, j, panels.panel[h / 3])
-            if not is_clear(surroundings, x, xi, xj, place, moved):
+            if not is_clear(surroundings, x, xi, xj, place, drift):
                 return False
         h = around(panels, h)
         if h < 0 or h == first:
@@ -165,9 +200,10 @@ def keeps_sewn_manifold(mesh: SewnMesh, p: int, w: int, h: int) -> bool:
 
 
 @wp.func
-def hand_over(mesh: SewnMesh, p: int, q: int) -> wp.vec3d:
+def hand_over(mesh: SewnMesh, p: int, q: int, drift: wp.float64) -> wp.vec3d:
     """Takes the shares of the faces around p off their corners and gives those of the faces that will be
-    there with q in its place; returns the momentum that this adds."""
+    there with q in its place, within `drift` of where they were loaded; returns the momentum that this
+    adds."""
     panels = mesh.panels
     sixth = wp.float64(1.0) / wp.float64(6.0)
     first = panels.leaving[p]
@@ -186,6 +222,8 @@ def hand_over(mesh: SewnMesh, p: int, q: int) -> wp.vec3d:
             new = doubled_area(panels.point[q], panels.point[i], panels.point[j]) * sixth
         touch(mesh, vi)
         touch(mesh, vj)
+        mesh.drift[vi] = wp.max(mesh.drift[vi], drift)
+        mesh.drift[vj] = wp.max(mesh.drift[vj], drift)
         mesh.area[vp] -= old
         mesh.area[vq] += new
         mesh.area[vi] += new - old
@@ -228,22 +266,26 @@ def collapse_if_fine(mesh: SewnMesh, surroundings: Surroundings, h: int, p: int,
         return False
     if not collapse_is_manifold(panels, h, p) or not keeps_sewn_manifold(mesh, p, w, h):
         return False
-    moved = wp.length(place_after(mesh, p, q) - mesh.x[v])
     if g >= 0:
         if not is_straight(panels, p2, q2) or not fan_fits(mesh, p2, q2, least):
             return False
         if not collapse_is_manifold(panels, g, p2) or not keeps_sewn_manifold(mesh, p2, w, g):
             return False
-        moved = wp.max(moved, wp.length(place_after(mesh, p2, q2) - mesh.x[v]))
-    if not fan_is_clear(mesh, surroundings, p, q, moved):
-        return False
-    if g >= 0 and not fan_is_clear(mesh, surroundings, p2, q2, moved):
-        return False
+    moved = surface_moves(mesh, p, q)
+    if g >= 0:
+        moved = wp.max(moved, surface_moves(mesh, p2, q2))
+    drift = mesh.drift[v]
+    if moved > FLAT:
+        drift += moved
+        if not fan_is_clear(mesh, surroundings, p, q, drift):
+            return False
+        if g >= 0 and not fan_is_clear(mesh, surroundings, p2, q2, drift):
+            return False
     mesh.clock[0] += 1
     touch(mesh, w)
-    gained = hand_over(mesh, p, q)
+    gained = hand_over(mesh, p, q, drift)
     if g >= 0:
-        gained += hand_over(mesh, p2, q2)
+        gained += hand_over(mesh, p2, q2, drift)
     mesh.v[w] -= gained / mesh.area[w]
     if g >= 0:
         collapse(panels, g, p2)

@@ -55,7 +55,11 @@ def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
     s = (ac[0] * cd[1] - ac[1] * cd[0]) / crossed
     r = (ac[0] * ab[1] - ac[1] * ab[0]) / crossed
     moved = wp.length(xa + (xb - xa) * s - xc - (xd - xc) * r)
+    # Both faces lie within that of all their corners.
+    drift = wp.min(mesh.drift[va], mesh.drift[vb])
+    drift = wp.max(wp.min(drift, mesh.drift[vc]), wp.min(drift, mesh.drift[vd]))
     if moved > FLAT:
+        drift += moved
         old = normal(xa, xb, xc) + normal(xb, xa, xd)
         if not turns_little(old, normal(xd, xc, xa)) or not turns_little(old, normal(xc, xd, xb)):
             return False
@@ -63,14 +67,18 @@ def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
         if crosses(mesh, vd, vc, va, gone) or crosses(mesh, vc, vd, vb, gone):
             return False
         panel = panels.panel[h / 3]
-        if not is_clear(surroundings, xd, xc, xa, place_of(mesh, d, c, a, panel), moved):
+        if not is_clear(surroundings, xd, xc, xa, place_of(mesh, d, c, a, panel), drift):
             return False
-        if not is_clear(surroundings, xc, xd, xb, place_of(mesh, c, d, b, panel), moved):
+        if not is_clear(surroundings, xc, xd, xb, place_of(mesh, c, d, b, panel), drift):
             return False
     third = wp.float64(1.0) / wp.float64(3.0)
     one = face_area(panels, h) * third
     other = face_area(panels, t) * third
     flip(panels, h)
+    mesh.drift[va] = wp.max(mesh.drift[va], drift)
+    mesh.drift[vb] = wp.max(mesh.drift[vb], drift)
+    mesh.drift[vc] = wp.max(mesh.drift[vc], drift)
+    mesh.drift[vd] = wp.max(mesh.drift[vd], drift)
     mesh.clock[0] += 1
     touch(mesh, va)
     touch(mesh, vb)

@@ -81,6 +81,7 @@ def split_edge(mesh: SewnMesh, h: int) -> bool:
     mesh.v[m] = (mesh.v[v] + mesh.v[w]) * half
     mesh.held[m] = (mesh.held[v] + mesh.held[w]) * half
     mesh.area[m] = wp.float64(0.0)
+    mesh.drift[m] = wp.min(mesh.drift[v], mesh.drift[w])
     mesh.locked[m] = 0
     mesh.copy[m] = -1
     mesh.origin[m] = -1

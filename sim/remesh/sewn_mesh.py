@@ -26,6 +26,7 @@ class SewnMesh:
     home        (P,) a face of the mesh before any change that the panel vertex lies in or near
     x, v, held  (V,) position, metres; velocity, m/s; what friction holds, metres
     area        (V,) area of the vertex in panel space, m^2: a third of each face's; its mass over the density
+    drift       (V,) metres from the surface as it was loaded within which the faces around the vertex lie
     locked      (V,) 0, or 1 where the vertex has to stay, or PINNED
     copy        (V,) one panel vertex of each sewn vertex, -1 where it is no more
     size        (2,) sewn vertices ever used, and those of them that are spare
@@ -45,6 +46,7 @@ class SewnMesh:
     v: wp.array(dtype=wp.vec3d)
     held: wp.array(dtype=wp.vec3d)
     area: wp.array(dtype=wp.float64)
+    drift: wp.array(dtype=wp.float64)
     locked: wp.array(dtype=wp.int32)
     copy: wp.array(dtype=wp.int32)
     size: wp.array(dtype=wp.int32)
@@ -93,7 +95,7 @@ def load(state: GarmentState, metric: NDArray[np.float64], room: int) -> SewnMes
     per_panel_vertex = {"uv": wp.vec2d, "vertex": wp.int32, "next_copy": wp.int32, "home": wp.int32}
     per_vertex = {"x": wp.vec3d, "v": wp.vec3d, "held": wp.vec3d, "area": wp.float64}
     per_vertex |= {"locked": wp.int32, "copy": wp.int32, "spare": wp.int32, "origin": wp.int32}
-    per_vertex |= {"changed": wp.int32}
+    per_vertex |= {"changed": wp.int32, "drift": wp.float64}
     for name, dtype in {**per_panel_vertex, **per_vertex}.items():
         setattr(mesh, name, wp.zeros(room, dtype=dtype, device="cpu"))
     mesh.size = wp.array([size_v, 0], dtype=wp.int32, device="cpu")

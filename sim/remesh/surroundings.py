@@ -1,11 +1,12 @@
 """Whether a triangle that remeshing would make keeps clear of everything else.
 
-Checked against the surface as it was before any change, and the body. Let an operation move the surface by up
-to d, and demand that its triangles stay 2 d + s away from the old surface elsewhere. Then two new triangles
-of operations with d1, d2 stay apart: their distance D is at least 2 d1 + s - d2 and 2 d2 + s - d1, since each
-lies within its d of the old surface, so 2 D >= d1 + d2 + 2 s > 0. Old faces that lie under the triangle or
-next to it, nearer than twice the margin in panel space, are left out: a surface touches itself there. Among
-those it must not cross the faces around its corners (`local_crossing`), nor turn much (`turns_little`).
+Checked against the surface as it was before any change, and the body. Let an operation and those before it in
+the same place move the surface by up to d, and demand that its triangles stay 2 d + s away from the old
+surface elsewhere. Then two new triangles with d1, d2 stay apart: their distance D is at least 2 d1 + s - d2
+and 2 d2 + s - d1, since each lies within its d of the old surface, so 2 D >= d1 + d2 + 2 s > 0. Old faces
+that lie under the triangle or next to it, nearer than twice the margin in panel space, are left out: a
+surface touches itself there. Among those it must not cross the faces around its corners (`local_crossing`),
+nor turn much (`turns_little`).
 """
 
 import numpy as np
