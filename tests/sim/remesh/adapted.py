@@ -60,6 +60,7 @@ def check_adapted(done: Adapted) -> None:
     check_conserved(done.before, done.after)
     check_kept(done)
     check_sizes(done)
+    check_drift(done)
     counts = count_intersections(done.after.positions, done.after.mesh.faces, *done.body)
     assert (counts.cloth_cloth, counts.cloth_body) == (0, 0)
 
@@ -183,3 +184,31 @@ def check_sizes(done: Adapted) -> None:
     faces = corner[corner[:, 0] != int(DEAD)]
     half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     assert edge_lengths(panels.point.numpy(), half, panels.metric.numpy()).max() <= 1.0 + 1e-12
+
+
+def check_drift(done: Adapted) -> None:
+    """Every point of the surface that was a vertex is within the drift of all corners of its face of where it
+    was."""
+    old, new = done.before, done.after
+    alive = np.flatnonzero(done.table.copy.numpy() >= 0)
+    drift = done.table.drift.numpy()[alive]
+    for panel in range(len(old.mesh.panel_names)):
+        points = np.flatnonzero(old.mesh.panel_vertex_panel == panel)
+        faces = np.flatnonzero(new.mesh.face_panel == panel)
+        face, weights = located(old.mesh.panel_vertices[points], new.mesh, faces)
+        corners = new.mesh.faces[face]
+        now = (weights[:, :, None] * new.positions[corners]).sum(axis=1)
+        moved = np.linalg.norm(now - old.positions[old.mesh.panel_to_vertex[points]], axis=1)
+        assert (moved <= drift[corners].min(axis=1) + 1e-9).all()
+
+
+def located(points: Array, mesh: GarmentMesh, faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    """(N,) which of some faces points (N, 2) of panel space lie in, or least outside, and (N, 3) where."""
+    a, b, c = mesh.panel_vertices[mesh.panel_faces[faces]].swapaxes(0, 1)
+    u, v, to = b - a, c - a, points[:, None] - a
+    whole = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    second = (to[..., 0] * v[:, 1] - to[..., 1] * v[:, 0]) / whole
+    third = (u[:, 0] * to[..., 1] - u[:, 1] * to[..., 0]) / whole
+    weights = np.stack([1.0 - second - third, second, third], axis=2)
+    best = weights.min(axis=2).argmax(axis=1)
+    return faces[best], weights[np.arange(len(points)), best]
