@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 
 wp.set_module_options({"enable_backward": False})
 
-CONDITION = wp.constant(wp.float64(0.02))
+CONDITION = wp.constant(wp.float64(0.003))
 """Smallest over largest eigenvalue of the normal equations of a fit that its hinges determine."""
 GROWTH = 3
 """How often a fit may take in the neighbours of its triangles."""
