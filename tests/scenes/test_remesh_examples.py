@@ -17,7 +17,7 @@ from muslin.sim.dataset.reader import open_dataset
 ROOT = Path(__file__).resolve().parents[2]
 REDUCED = [
     part
-    for key in ("garment.preset=top", "garment.edge_length=0.065", "solver.settle_steps=2", "solver.dt=0.034")
+    for key in ("garment.edge_length=0.065", "solver.settle_steps=2", "solver.dt=0.034")
     for part in ("--set", key)
 ]
 
