@@ -40,24 +40,45 @@ def factor_products(
     offsets: NDArray[np.int32], columns: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """`product_offsets` (L + 1,) and `products` (P, 2) of a strictly lower pattern, for `LowerFactor`."""
-    n = len(offsets) - 1
-    rows = np.repeat(np.arange(n), np.diff(offsets))
-    keys = rows * n + columns
-    by_column = np.lexsort((rows, columns))
-    found = []
-    # Every two entries of one column, `apart` places of it; what they fill in counts where there is room.
-    for apart in range(1, int(np.bincount(columns, minlength=1).max(initial=0))):
-        v, u = by_column[:-apart], by_column[apart:]
-        same = columns[v] == columns[u]
-        v, u = v[same], u[same]
-        wanted = rows[u] * n + rows[v]
-        entry = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        inside = keys[entry] == wanted
-        found.append(np.stack([entry, u, v], axis=1)[inside])
-    triples = np.concatenate([np.zeros((0, 3), np.int64), *found])
-    triples = triples[np.lexsort((triples[:, 1], triples[:, 0]))]
-    starts = np.searchsorted(triples[:, 0], np.arange(len(columns) + 1))
-    return starts.astype(np.int32), triples[:, 1:].astype(np.int32)
+    pattern = [wp.array(array, dtype=wp.int32, device="cpu") for array in (offsets, columns)]
+    ends = wp.zeros(len(columns) + 1, dtype=wp.int32, device="cpu")
+    products = wp.zeros(0, dtype=wp.vec2i, device="cpu")
+    # Once to count them, once to write them.
+    for _ in range(2):
+        wp.launch(list_products, 1, inputs=[*pattern, ends, products], device="cpu")
+        if len(products) == 0:
+            products = wp.zeros(int(ends.numpy()[-1]), dtype=wp.vec2i, device="cpu")
+    return ends.numpy(), products.numpy()
+
+
+@wp.kernel
+def list_products(
+    offsets: wp.array(dtype=wp.int32),
+    columns: wp.array(dtype=wp.int32),
+    ends: wp.array(dtype=wp.int32),
+    products: wp.array(dtype=wp.vec2i),
+):
+    """Products of every entry (i, k), one after the other, as far as there is room for them: entries of rows
+    i and k in the same column, both rows gone through at once. Serial."""
+    total = int(0)
+    for i in range(offsets.shape[0] - 1):
+        for a in range(offsets[i], offsets[i + 1]):
+            k = columns[a]
+            u = int(offsets[i])
+            v = int(offsets[k])
+            end = offsets[k + 1]
+            while u < a and v < end:
+                if columns[u] == columns[v]:
+                    if total < products.shape[0]:
+                        products[total] = wp.vec2i(u, v)
+                    total += 1
+                    u += 1
+                    v += 1
+                elif columns[u] < columns[v]:
+                    u += 1
+                else:
+                    v += 1
+            ends[a + 1] = total
 
 
 @wp.func
