@@ -120,6 +120,19 @@ def shares_vertex(faces: wp.array2d(dtype=wp.int32), f: int, g: int) -> bool:
 
 
 @wp.func
+def is_beyond_seam(around: Surroundings, f: int, g: int) -> bool:
+    """Whether two faces have a sewn vertex in common, but other copies of it."""
+    for i in range(3):
+        for j in range(3):
+            if (
+                around.faces[f, i] == around.faces[g, j]
+                and around.panel_faces[f, i] != around.panel_faces[g, j]
+            ):
+                return True
+    return False
+
+
+@wp.func
 def flat(p: wp.vec2d) -> wp.vec3d:
     """A point of panel space as one of a plane in space."""
     return wp.vec3d(p[0], p[1], wp.float64(0.0))
@@ -128,12 +141,15 @@ def flat(p: wp.vec2d) -> wp.vec3d:
 @wp.func
 def lies_next_to(around: Surroundings, place: Place, f: int, reach: wp.float64) -> bool:
     """Whether an old face near the corners of a triangle lies under it, or nearer than `reach` in panel
-    space; of another panel, beyond a seam, it does."""
+    space; beyond a seam, of this panel or another, it does."""
     near = shares_vertex(around.faces, f, place.home[0]) or shares_vertex(around.faces, f, place.home[1])
     if not near and not shares_vertex(around.faces, f, place.home[2]):
         return False
     if around.panel[f] != place.panel:
         return True
+    for k in range(3):
+        if is_beyond_seam(around, f, place.home[k]):
+            return True
     p = flat(around.point[around.panel_faces[f, 0]])
     q = flat(around.point[around.panel_faces[f, 1]])
     r = flat(around.point[around.panel_faces[f, 2]])
