@@ -132,6 +132,20 @@ def reach(
 
 
 @app.command()
+def adaptive(out: Out = OUT / "adaptive", rounds: Rounds = 3) -> None:
+    """Error of drapes for their vertices and seconds, uniform and remeshed; write adaptive.md and .png."""
+    from benchmarks.adaptive import measure, plot, table
+
+    drapes = measure(rounds, typer.echo)
+    out.mkdir(parents=True, exist_ok=True)
+    text = table(drapes)
+    _write(out / "adaptive.json", [asdict(drape) for drape in drapes])
+    (out / "adaptive.md").write_text(text, encoding="utf-8")
+    plot(drapes, out / "adaptive.png")
+    typer.echo(text)
+
+
+@app.command()
 def drape(
     out: Out = OUT,
     neighbours: Annotated[int, typer.Option(min=0, help="Drapes that start from the one before.")] = 4,
