@@ -23,6 +23,9 @@ SWING_STEP = 1.0 / 30.0
 SWING = 5.0
 """Multiple of the tolerance below which the moves of three steps end the swinging."""
 STILL_SWINGS = 3
+SLOW = 10.0
+"""Multiple of that below which the mesh is left as it is, once remeshing finds next to nothing to change: the
+cloth would wait for the last of it."""
 
 LONGEST = 1.0
 """Seconds: the longest step without inertia."""
@@ -49,12 +52,13 @@ def settle(
     tolerance: float,
     max_steps: int,
     tick: Callable[[], None] | None = None,
-    remesh: Callable[[], object] | None = None,
+    remesh: Callable[[], bool] | None = None,
 ) -> RestReport:
     """Step until `STILL_STEPS` steps of `LONGEST` seconds moved no vertex by more than `tolerance` metres.
 
-    At most `max_steps` steps, half of them swinging; `remesh` is called after each of these, `tick` after
-    every step. The mesh that the cloth has when the swing is over is that in which it comes to rest.
+    At most `max_steps` steps, half of them swinging; `tick` is called after every step, `remesh` after the
+    swinging ones, until it says that the mesh is as it should be and little moves: in that mesh the cloth
+    comes to rest.
     """
     usual = sim.settings
     sim.settings = replace(usual, linear_tolerance=min(usual.linear_tolerance, LINEAR_TOLERANCE))
@@ -78,21 +82,22 @@ def _swing(
     tolerance: float,
     max_steps: int,
     tick: Callable[[], None] | None,
-    remesh: Callable[[], object] | None,
+    remesh: Callable[[], bool] | None,
 ) -> int:
     """Kinetic damping until `STILL_SWINGS` steps moved no vertex by over `tolerance`; the steps taken."""
     energy = 0.0
     still = steps = 0
     while steps < max_steps and still < STILL_SWINGS:
-        still = still + 1 if measured_step(sim, SWING_STEP, inertia=True) < tolerance else 0
+        moved = measured_step(sim, SWING_STEP, inertia=True)
+        still = still + 1 if moved < tolerance else 0
         steps += 1
         now = float(0.5 * (sim.cloth.mass[:, None] * sim.velocity**2).sum())
         if now < energy:
             sim.velocity[:] = 0.0
             now = 0.0
         energy = now
-        if remesh is not None:
-            remesh()
+        if remesh is not None and remesh() and moved < SLOW * tolerance:
+            remesh = None
         if tick is not None:
             tick()
     sim.velocity[:] = 0.0

@@ -95,10 +95,13 @@ class WornGarment:
         self.sim = dress(meshes, cloths, model, beta, contact, solver, device, tick)
         self.remesher: Remesher | None = None
 
-    def remesh(self) -> None:
-        """To be called after a time step: the mesh follows what the cloth does, if there is a `remesher`."""
-        if self.remesher is not None:
-            self.remesher.step(self.sim)
+    def remesh(self) -> bool:
+        """To be called after a time step: the mesh follows what the cloth does, if there is a `remesher`.
+        Returns whether it is as it should be."""
+        if self.remesher is None:
+            return True
+        self.remesher.step(self.sim)
+        return self.remesher.calm
 
     def body(self) -> NDArray[np.float64]:
         """(N, 3) vertices of the body as it stands, metres."""

@@ -20,6 +20,9 @@ from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState
 from muslin.sim.remesh.sizing import sizing_field
 from muslin.sim.solve.simulator import ClothSimulator
 
+CALM = 0.02
+"""Changes over faces: fewer do not show, and a cloth that comes to rest would wait for the last of them."""
+
 
 class Remesher:
     """Keeps the mesh of the cloth of one simulator as fine as it has to be, and no finer.
@@ -27,6 +30,7 @@ class Remesher:
     mesh       the mesh that the cloth has now; another object after every change
     seconds    spent on remeshing, what it takes to go on with another mesh included
     changes    what was done so far
+    calm       whether the last remeshing changed next to nothing
     """
 
     def __init__(self, settings: RemeshSettings, mesh: GarmentMesh, fabrics: Sequence[Fabric]) -> None:
@@ -35,6 +39,7 @@ class Remesher:
         self.mesh = mesh
         self.seconds = 0.0
         self.changes = Changes(0, 0, 0)
+        self.calm = False
         self._fabrics = tuple(fabrics)
         self._corners = np.zeros(mesh.num_vertices, np.int32)
         for curve in curves(mesh):
@@ -63,6 +68,7 @@ class Remesher:
             self.mesh, state.positions, self.settings, state.velocities, obstacle, contact_range=range_
         )
         after, origin, changes = adapt(state, metric, obstacle, self.settings.aspect_min)
+        self.calm = changes.total <= CALM * len(self.mesh.faces)
         done = self.changes
         self.changes = Changes(
             done.splits + changes.splits, done.flips + changes.flips, done.collapses + changes.collapses

@@ -108,11 +108,15 @@ class _Stage:
         distance = self.sim.contact.smallest_distance(self.sim.x)
         return _Frame(mesh, self.sim.positions, self.colliders.at(time), distance)
 
-    def remesh(self) -> None:
-        """To be called after a time step: the mesh follows what the cloth does, if the scene says so."""
-        origin = None if self.remesher is None else self.remesher.step(self.sim)
+    def remesh(self) -> bool:
+        """To be called after a time step: the mesh follows what the cloth does, if the scene says so. Returns
+        whether it is as it should be."""
+        if self.remesher is None:
+            return True
+        origin = self.remesher.step(self.sim)
         if origin is not None:
             self.pins.renumber(origin)
+        return self.remesher.calm
 
     def settle(self, tick: Tick) -> RestReport:
         s = self.scene.solver
