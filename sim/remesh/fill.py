@@ -115,13 +115,12 @@ class _Table:
 
     def _measure(self) -> None:
         """Asks for the metric of interior vertices where they are now."""
-        faces, panel = faces_of(self.mesh)
-        vertex = np.unique(faces)
+        leaving = self.mesh.leaving.numpy()
+        vertex = np.flatnonzero(leaving >= 0)
         vertex = vertex[vertex >= self.rim]
-        of_vertex = np.zeros(len(self.mesh.point), dtype=np.int32)
-        of_vertex[faces] = panel[:, None]
-        points = self.mesh.point.numpy()
-        self.mesh.metric.numpy()[vertex] = self.metric(points[vertex], of_vertex[vertex])
+        points = self.mesh.point.numpy()[vertex]
+        panel = self.mesh.panel.numpy()[leaving[vertex] // 3]
+        self.mesh.metric.numpy()[vertex] = self.metric(points, panel)
 
 
 def _rim_only(rim: NDArray[np.float64], metric: NDArray[np.float64], interior: int) -> PanelMesh:
