@@ -10,7 +10,7 @@ collapses are refused, and how momentum is kept, is our own.
 import warp as wp
 
 from muslin.sim.remesh.edge_flip import FLAT
-from muslin.sim.remesh.local_crossing import crosses, normal, place_of
+from muslin.sim.remesh.local_crossing import MOST_STRETCH, crosses, normal, place_of, stretch
 from muslin.sim.remesh.operations import collapse, collapse_is_manifold, doubled_area, other_end
 from muslin.sim.remesh.panel_mesh import PanelMesh, apex, around, head, preceding
 from muslin.sim.remesh.passes import squared_length
@@ -146,8 +146,8 @@ def fan_fits(mesh: SewnMesh, p: int, q: int, least: wp.float64) -> bool:
 
 @wp.func
 def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, drift: wp.float64) -> bool:
-    """Whether, in the world, the faces around p with q in its place turn little and keep clear of everything,
-    where they are within `drift` of the surface as it was loaded."""
+    """Whether, in the world, the faces around p with q in its place turn little, are not stretched and keep
+    clear of everything, where they are within `drift` of the surface as it was loaded."""
     panels = mesh.panels
     first = panels.leaving[p]
     h = first
@@ -160,6 +160,8 @@ def fan_is_clear(mesh: SewnMesh, surroundings: Surroundings, p: int, q: int, dri
             xi = mesh.x[mesh.vertex[i]]
             xj = mesh.x[mesh.vertex[j]]
             if not turns_little(normal(mesh.x[mesh.vertex[p]], xi, xj), normal(x, xi, xj)):
+                return False
+            if stretch(mesh, q, i, j) > wp.max(MOST_STRETCH, stretch(mesh, p, i, j)):
                 return False
             if crosses(mesh, mesh.vertex[q], mesh.vertex[i], mesh.vertex[j], gone):
                 return False

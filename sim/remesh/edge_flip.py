@@ -7,7 +7,7 @@ flips are refused, and how momentum is kept, is our own.
 import warp as wp
 
 from muslin.sim.remesh.edge_split import face_area
-from muslin.sim.remesh.local_crossing import crosses, normal, place_of
+from muslin.sim.remesh.local_crossing import MOST_STRETCH, crosses, normal, place_of, stretch
 from muslin.sim.remesh.operations import can_flip, flip
 from muslin.sim.remesh.panel_mesh import apex
 from muslin.sim.remesh.passes import is_illegal, squared_length
@@ -22,7 +22,7 @@ FLAT = wp.constant(wp.float64(1.0e-12))  # metres: moves of the surface below it
 @wp.func
 def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
     """Flips an edge that is illegal in the metric, if the new one is no longer than it may be and than both
-    were, and the two new faces keep clear of everything and turn little."""
+    were, and the two new faces keep clear of everything, turn little and are not stretched."""
     panels = mesh.panels
     if not is_illegal(panels, h) or not can_flip(panels, h):
         return False
@@ -62,6 +62,9 @@ def flip_if_better(mesh: SewnMesh, surroundings: Surroundings, h: int) -> bool:
         drift += moved
         old = normal(xa, xb, xc) + normal(xb, xa, xd)
         if not turns_little(old, normal(xd, xc, xa)) or not turns_little(old, normal(xc, xd, xb)):
+            return False
+        most = wp.max(MOST_STRETCH, wp.max(stretch(mesh, a, b, c), stretch(mesh, b, a, d)))
+        if stretch(mesh, d, c, a) > most or stretch(mesh, c, d, b) > most:
             return False
         gone = wp.vec2i(h / 3, t / 3)
         if crosses(mesh, vd, vc, va, gone) or crosses(mesh, vc, vd, vb, gone):

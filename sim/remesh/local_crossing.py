@@ -1,4 +1,5 @@
-"""Where a new triangle of a garment would lie, and whether it would cross faces around its vertices."""
+"""Where a new triangle of a garment would lie, how stretched, and whether it would cross faces around its
+vertices."""
 
 import warp as wp
 
@@ -13,6 +14,28 @@ wp.set_module_options({"enable_backward": False})
 def normal(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d) -> wp.vec3d:
     """Normal of a triangle, of twice its area."""
     return wp.cross(b - a, c - a)
+
+
+# Flips and collapses may bring it about. More of it, where triangles cut folds short, sets cloth in motion.
+MOST_STRETCH = wp.constant(wp.float64(1.05))
+
+
+@wp.func
+def stretch(mesh: SewnMesh, a: int, b: int, c: int) -> wp.float64:
+    """Largest principal stretch of the triangle of three panel vertices: root of the larger eigenvalue of
+    F^T F, F = [x_b - x_a, x_c - x_a] D^-1, D the same in panel space."""
+    p = mesh.panels.point[b] - mesh.panels.point[a]
+    q = mesh.panels.point[c] - mesh.panels.point[a]
+    det = p[0] * q[1] - p[1] * q[0]
+    u = mesh.x[mesh.vertex[b]] - mesh.x[mesh.vertex[a]]
+    v = mesh.x[mesh.vertex[c]] - mesh.x[mesh.vertex[a]]
+    along = (u * q[1] - v * p[1]) / det
+    across = (v * p[0] - u * q[0]) / det
+    half = wp.float64(0.5)
+    mean = half * (wp.dot(along, along) + wp.dot(across, across))
+    difference = half * (wp.dot(along, along) - wp.dot(across, across))
+    shear = wp.dot(along, across)
+    return wp.sqrt(mean + wp.sqrt(difference * difference + shear * shear))
 
 
 @wp.func

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from muslin.garments.merge import merge_meshes
 from muslin.garments.mesh import GarmentMesh
+from muslin.sim.elastic import principal_stretches
 from muslin.sim.remesh.metric import edge_lengths
 from muslin.sim.remesh.panel_mesh import DEAD
 from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState
@@ -255,7 +256,7 @@ def test_seams_within_a_panel_are_made_coarser() -> None:
         if other_side(draped.mesh, a, b) is not None:
             table, _ = table_of(draped)
             found += table.collapse(a, b, a)
-    assert found > 20
+    assert found >= 10
 
 
 def test_what_is_locked_stays() -> None:
@@ -353,6 +354,19 @@ def test_a_flip_that_folds_cloth_over_is_refused() -> None:
     for lift, expected in ((0.005, True), (0.12, False)):
         roof = square(lift)
         assert Table(roof.state(), coarse(roof.mesh), NOBODY).flip(2, 0) == expected
+
+
+@pytest.mark.parametrize(("slope", "expected"), [(30.0, True), (65.0, False)])
+def test_a_flip_that_stretches_is_refused(slope: float, expected: bool) -> None:
+    """A roof without strain. The faces across its ridge lie lower in the middle and are longer by
+    sqrt(1 + (2/5)^2 sin^2 slope): 1.02 and 1.06."""
+    roof = square(0.0)
+    width = np.array([0.0, 0.02, 0.0, -0.02])
+    angle = np.radians(slope)
+    positions = np.stack([roof.positions[:, 0], -np.abs(width) * np.sin(angle), width * np.cos(angle)], 1)
+    assert principal_stretches(roof.mesh, positions) == pytest.approx(1.0)
+    table = Table(replace(roof.state(), positions=positions), coarse(roof.mesh), NOBODY)
+    assert table.flip(2, 0) == expected
 
 
 def test_dead_faces_are_marked() -> None:
