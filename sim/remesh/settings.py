@@ -30,7 +30,7 @@ class RemeshTable(Table):
     size_min: Size = 0.01
     size_max: Size = 0.2
     aspect_min: Aspect = 0.2
-    every: Every = 4
+    every: Every = 2
 
     @model_validator(mode="after")
     def _ordered(self) -> RemeshTable:
@@ -66,7 +66,7 @@ class RemeshSettings:
     size_min: float = 0.01
     size_max: float = 0.2
     aspect_min: float = 0.2
-    every: int = 4
+    every: int = 2
 
     def __post_init__(self) -> None:
         try:
