@@ -44,10 +44,11 @@ def panel_boundary(mesh: GarmentMesh) -> tuple[NDArray[np.int32], NDArray[np.int
     half = np.concatenate(
         [mesh.panel_faces[:, [0, 1]], mesh.panel_faces[:, [1, 2]], mesh.panel_faces[:, [2, 0]]]
     )
-    size = len(mesh.panel_vertices)
-    key = half.astype(np.int64) @ np.array([size, 1])
-    single = ~np.isin(key, half[:, ::-1].astype(np.int64) @ np.array([size, 1]))
-    return half[single], np.flatnonzero(single) % len(mesh.faces)
+    key = half.min(axis=1).astype(np.int64) * len(mesh.panel_vertices) + half.max(axis=1)
+    order = np.argsort(key)
+    differs = np.r_[True, np.diff(key[order]) != 0, True]
+    single = np.sort(order[differs[:-1] & differs[1:]])
+    return half[single], single % len(mesh.faces)
 
 
 def curves(mesh: GarmentMesh) -> list[Curve]:

@@ -112,7 +112,9 @@ def remesh(
         found, field = _draw(mesh, positions, metric, space, enough, rng)
         local = field.at(found.mesh.panel_vertices, found.mesh.panel_vertex_panel)
         shape = distortion(found.mesh, local)
-        worst = float(shape.max(where=~forced(found.mesh, mesh, metric, max_distortion), initial=1.0))
+        worst = float(shape.max())
+        if worst > max_distortion:
+            worst = float(shape.max(where=~forced(found.mesh, mesh, metric, max_distortion), initial=1.0))
         if worst <= max_distortion:
             return replace(found, distortion=worst)
         reached = min(reached, worst)
