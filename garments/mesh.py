@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from muslin.garments.errors import InputError
+from muslin.garments.half_edges import half_edges, on_boundary, opposite
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,17 +46,17 @@ class GarmentMesh:
     @cached_property
     def edges(self) -> NDArray[np.int32]:
         """(E, 2) int32 edges of the sewn mesh, each once, smaller vertex first, sorted."""
-        return np.unique(np.sort(_half_edges(self.faces), axis=1), axis=0)
+        return np.unique(np.sort(half_edges(self.faces), axis=1), axis=0)
 
     @cached_property
     def boundary_edges(self) -> NDArray[np.int32]:
         """(B, 2) int32 edges with one face, directed as in that face, so the garment lies to their left."""
-        return _boundary(self.faces)
+        return half_edges(self.faces)[on_boundary(self.faces)]
 
     @cached_property
     def panel_boundary_edges(self) -> NDArray[np.int32]:
         """(B, 2) int32 edges of the panels, seams included, over panel vertices; the panel to their left."""
-        return _boundary(self.panel_faces)
+        return half_edges(self.panel_faces)[on_boundary(self.panel_faces)]
 
     @cached_property
     def boundary_loops(self) -> tuple[NDArray[np.int32], ...]:
@@ -167,7 +168,7 @@ def validate_manifold(faces: NDArray[np.int32], here: str) -> None:
         raise InputError(f"{here}: face {bad} names a vertex twice: {faces[bad].tolist()}")
     # As numbers, which sort many times faster than rows.
     size = int(faces.max()) + 1
-    key = np.sort(_half_edges(faces).astype(np.int64) @ [size, 1])
+    key = np.sort(half_edges(faces).astype(np.int64) @ [size, 1])
     twice = key[1:][key[1:] == key[:-1]]
     if len(twice):
         edge = divmod(int(twice[0]), size)
@@ -201,16 +202,6 @@ def corner_angles(points: NDArray[np.float64], faces: NDArray[np.int32]) -> NDAr
     return angles
 
 
-def _half_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-
-
-def _boundary(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    half = _half_edges(faces)
-    _, inverse, counts = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return half[counts[inverse.reshape(-1)] == 1]
-
-
 def _fans(faces: NDArray[np.int32]) -> NDArray[np.int64]:
     """(V,) number of edge-connected groups of faces around each vertex.
 
@@ -220,15 +211,12 @@ def _fans(faces: NDArray[np.int32]) -> NDArray[np.int64]:
     count = len(faces)
     corner = np.arange(3 * count).reshape(count, 3)
     # Half edge a->b of a face: corner at a (`tail`), corner at b (`head`).
-    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    half = half_edges(faces)
     tail = np.concatenate([corner[:, 0], corner[:, 1], corner[:, 2]])
     head = np.concatenate([corner[:, 1], corner[:, 2], corner[:, 0]])
     size = int(faces.max()) + 1
-    key, opposite = half[:, 0] * size + half[:, 1], half[:, 1] * size + half[:, 0]
-    order = np.argsort(key)
-    slot = np.minimum(np.searchsorted(key[order], opposite), len(order) - 1)
-    twin = order[slot]
-    paired = key[twin] == opposite
+    twin = opposite(half[:, 0], half[:, 1], size)
+    paired = twin >= 0
     rows = np.concatenate([tail[paired], head[paired]])
     columns = np.concatenate([head[twin[paired]], tail[twin[paired]]])
     graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(3 * count, 3 * count))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from muslin.garments.errors import InputError
+from muslin.garments.half_edges import half_edges
 from muslin.garments.mesh import signed_areas
 
 CLEARANCE = 0.62  # least distance of a lattice point from the boundary, in edge lengths
@@ -134,6 +135,6 @@ def _long_edges(points: NDArray[np.float64], faces: NDArray[np.int32], longest: 
 
 def _missing_edges(faces: NDArray[np.int32], fixed: int) -> NDArray[np.int64]:
     """Boundary edges i -> i + 1 that no triangle has."""
-    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    half = half_edges(faces)
     present = half[:, 0][(half[:, 0] < fixed) & (half[:, 1] == (half[:, 0] + 1) % fixed)]
     return np.setdiff1d(np.arange(fixed), present)

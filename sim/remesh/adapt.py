@@ -7,6 +7,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
+from muslin.garments.half_edges import half_edges
 from muslin.sim.remesh.edge_collapse import collapse_if_fine
 from muslin.sim.remesh.edge_flip import flip_if_better
 from muslin.sim.remesh.edge_split import size_squared, split_edge
@@ -197,7 +198,7 @@ def _within_led_edges(state: GarmentState, metric: NDArray[np.float64]) -> NDArr
     would never end.
     """
     faces = state.mesh.panel_faces
-    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    half = half_edges(faces)
     led = half[(state.locked[state.mesh.panel_to_vertex[half]] == int(PINNED)).all(axis=1)]
     sizes = np.maximum(edge_lengths(state.mesh.panel_vertices, led, metric), 1.0)
     largest = np.ones(len(metric))

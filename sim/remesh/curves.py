@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from muslin.garments.half_edges import half_edges, on_boundary
 from muslin.garments.mesh import GarmentMesh
 
 SHARP = np.radians(30.0)  # turn of a panel's boundary that makes a corner
@@ -41,14 +42,8 @@ class Curve:
 
 def panel_boundary(mesh: GarmentMesh) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Edges (B, 2) of panel vertices that one triangle has, its panel to their left, and (B,) that face."""
-    half = np.concatenate(
-        [mesh.panel_faces[:, [0, 1]], mesh.panel_faces[:, [1, 2]], mesh.panel_faces[:, [2, 0]]]
-    )
-    key = half.min(axis=1).astype(np.int64) * len(mesh.panel_vertices) + half.max(axis=1)
-    order = np.argsort(key)
-    differs = np.r_[True, np.diff(key[order]) != 0, True]
-    single = np.sort(order[differs[:-1] & differs[1:]])
-    return half[single], single % len(mesh.faces)
+    single = on_boundary(mesh.panel_faces)
+    return half_edges(mesh.panel_faces)[single], single % len(mesh.faces)
 
 
 def curves(mesh: GarmentMesh) -> list[Curve]:

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
+from muslin.garments.half_edges import opposite
 from muslin.sim.remesh import passes, relax
 from muslin.sim.remesh.metric import eigenvalues
 from muslin.sim.remesh.panel_mesh import FREE, PanelMesh, empty_mesh, faces_of
@@ -151,14 +152,11 @@ def _close_bridges(mesh: PanelMesh) -> None:
     """Makes the two sides of bridges to holes twins: to `clip_ears` either is boundary."""
     corner, twin, leaving = mesh.corner.numpy(), mesh.twin.numpy(), mesh.leaving.numpy()
     rim = np.flatnonzero(twin[: 3 * int(mesh.size.numpy()[1])] == int(FREE))
-    ends = np.stack([corner[rim], corner[np.where(rim % 3 == 2, rim - 2, rim + 1)]], axis=1).astype(np.int64)
-    size = len(leaving)
-    key, opposite = ends @ [size, 1], ends @ [1, size]
-    order = np.argsort(key)
-    there = order[np.minimum(np.searchsorted(key, opposite, sorter=order), len(order) - 1)]
-    bridge = key[there] == opposite
+    tail, head = corner[rim], corner[np.where(rim % 3 == 2, rim - 2, rim + 1)]
+    there = opposite(tail, head, len(leaving))
+    bridge = there >= 0
     twin[rim[bridge]] = rim[there[bridge]]
-    leaving[ends[~bridge, 0]] = rim[~bridge]
+    leaving[tail[~bridge]] = rim[~bridge]
 
 
 def _compacted(mesh: PanelMesh, rim: int) -> Filling:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from muslin.garments.half_edges import opposite
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.remesh.metric import edge_lengths, quadratic_form
 
@@ -40,15 +41,9 @@ class SeamEdges:
         # A dart begins at a vertex that has no copy.
         near = (copies[start] > 1) | (copies[end] > 1)
         start, end = start[near], end[near]
-        if not len(start):
-            return SeamEdges(start, end, start, end)
-        size = mesh.num_vertices
-        sewn_start, sewn_end = (mesh.panel_to_vertex[side].astype(np.int64) for side in (start, end))
-        key, opposite = sewn_start * size + sewn_end, sewn_end * size + sewn_start
-        order = np.argsort(key)
-        slot = np.minimum(np.searchsorted(key, opposite, sorter=order), len(order) - 1)
-        twin = order[slot]
-        sewn = (key[twin] == opposite) & ((start[twin] != end) | (end[twin] != start))
+        sewn_start, sewn_end = (mesh.panel_to_vertex[side] for side in (start, end))
+        twin = opposite(sewn_start, sewn_end, mesh.num_vertices)
+        sewn = (twin >= 0) & ((start[twin] != end) | (end[twin] != start))
         twin = twin[sewn]
         return SeamEdges(start[sewn], end[sewn], start[twin], end[twin])
 

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from muslin.garments.half_edges import opposite
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.remesh.panel_mesh import FREE, PanelMesh, apex, around, empty_mesh, head
 
@@ -150,21 +151,12 @@ def _twins(garment: GarmentMesh) -> NDArray[np.int64]:
     """(3 F,) twins as `panel_mesh` says, by panel vertices first and by sewn ones where those find none."""
     faces = garment.panel_faces.astype(np.int64)
     tail, tip = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    twin = _opposite(tail, tip, len(garment.panel_vertices))
+    twin = opposite(tail, tip, len(garment.panel_vertices))
     rim = np.flatnonzero(twin < 0)
     vertex = garment.panel_to_vertex
-    mate = _opposite(vertex[tail[rim]], vertex[tip[rim]], garment.num_vertices)
+    mate = opposite(vertex[tail[rim]], vertex[tip[rim]], garment.num_vertices)
     twin[rim] = np.where(mate >= 0, -2 - rim[mate], int(FREE))
     return twin
-
-
-def _opposite(tail: NDArray[np.integer], tip: NDArray[np.integer], size: int) -> NDArray[np.int64]:
-    """For each directed edge the one that runs the other way, or -1."""
-    key = tail.astype(np.int64) * size + tip
-    back = tip.astype(np.int64) * size + tail
-    order = np.argsort(key)
-    slot = np.minimum(np.searchsorted(key[order], back), len(order) - 1)
-    return np.where(key[order[slot]] == back, order[slot], -1)
 
 
 def _next_copies(panel_to_vertex: NDArray[np.int32]) -> NDArray[np.int64]:
