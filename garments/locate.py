@@ -36,15 +36,20 @@ def locate(
     return face, weights
 
 
-def _best(
-    corners: NDArray[np.float64], candidates: NDArray[np.int64], queries: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    a, b, c = (corners[candidates, k] for k in range(3))
-    u, v, w = b - a, c - a, queries[:, None] - a
+def barycentric(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(..., 3) barycentric coordinates of points (..., 2) in triangles (..., 3, 2); negative ones outside."""
+    a, b, c = (corners[..., k, :] for k in range(3))
+    u, v, w = b - a, c - a, points - a
     area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     second = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / area
     third = (u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]) / area
-    weights = np.stack([1.0 - second - third, second, third], axis=-1)
+    return np.stack([1.0 - second - third, second, third], axis=-1)
+
+
+def _best(
+    corners: NDArray[np.float64], candidates: NDArray[np.int64], queries: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    weights = barycentric(corners[candidates], queries[:, None])
     best = weights.min(axis=-1).argmax(axis=1)
     rows = np.arange(len(queries))
     return candidates[rows, best], weights[rows, best]

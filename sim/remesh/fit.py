@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
+from muslin.garments.locate import barycentric
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.remesh.panel_space import PanelSpace
 from muslin.sim.remesh.topology import MAX_DISTORTION, Remeshed, remesh
@@ -103,10 +104,5 @@ def _surface(remeshed: Remeshed, positions: Array, face: NDArray[np.int64], weig
     source, mesh = remeshed.source, remeshed.mesh
     place = np.einsum("qk,qkj->qj", weights, mesh.panel_vertices[mesh.panel_faces[face]])
     found, _ = PanelSpace(source).locate(place, mesh.face_panel[face])
-    corners = source.panel_vertices[source.panel_faces[found]]
-    u, v, w = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], place - corners[:, 0]
-    doubled = 2.0 * source.face_areas[found]
-    second = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / doubled
-    third = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / doubled
-    y = positions[source.faces[found]]
-    return y[:, 0] + second[:, None] * (y[:, 1] - y[:, 0]) + third[:, None] * (y[:, 2] - y[:, 0])
+    within = barycentric(source.panel_vertices[source.panel_faces[found]], place)
+    return np.einsum("qk,qkj->qj", within, positions[source.faces[found]])

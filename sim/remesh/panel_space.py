@@ -6,6 +6,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
+from muslin.garments.locate import barycentric
 from muslin.garments.mesh import GarmentMesh
 
 
@@ -33,10 +34,4 @@ class PanelSpace:
             return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         lifted = self.lift(points, panel)
         _, face, nearest = igl.point_mesh_squared_distance(lifted, self._lifted, self._faces)
-        corners = self._points[self._faces[face]]
-        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        w = nearest[:, :2] - corners[:, 0]
-        area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-        second = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / area
-        third = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / area
-        return face.astype(np.int64), np.stack([1.0 - second - third, second, third], axis=1)
+        return face.astype(np.int64), barycentric(self._points[self._faces[face]], nearest[:, :2])
