@@ -11,7 +11,7 @@ from muslin.garments.half_edges import half_edges
 from muslin.sim.remesh.edge_collapse import collapse_if_fine
 from muslin.sim.remesh.edge_flip import flip_if_better
 from muslin.sim.remesh.edge_split import size_squared, split_edge
-from muslin.sim.remesh.metric import area_density, edge_lengths
+from muslin.sim.remesh.metric import edge_lengths, triangles_asked
 from muslin.sim.remesh.obstacle import Obstacle
 from muslin.sim.remesh.panel_mesh import DEAD, PanelMesh, apex, head
 from muslin.sim.remesh.sewn_mesh import PINNED, GarmentState, SewnMesh, load, unload, was_refused
@@ -19,7 +19,6 @@ from muslin.sim.remesh.surroundings import Surroundings, Tree
 
 wp.set_module_options({"enable_backward": False})
 
-EQUILATERAL = np.sqrt(3.0) / 4.0
 SPARE = 3.0
 """Room for so many times the vertices that the metric asks for: bisected edges are 0.7 long in the mean, so
 there are twice as many as of unit edges."""
@@ -159,8 +158,7 @@ def adapt(
     """
     mesh = state.mesh
     metric = _within_led_edges(state, metric)
-    density = mesh.face_areas * area_density(metric[mesh.panel_faces].mean(axis=1))
-    asked = 0.5 * float(density.sum()) / EQUILATERAL
+    asked = 0.5 * float(triangles_asked(mesh, metric).sum())
     room = int(SPARE * max(asked, len(mesh.panel_vertices))) + 256
     if room > MOST_VERTICES:
         raise InputError(

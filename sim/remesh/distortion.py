@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 
 from muslin.garments.boundary_angles import boundary_angles, corners_at
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.remesh.metric import area_density, quadratic_form
+from muslin.sim.remesh.metric import EQUILATERAL, area_density, quadratic_form
 
 Array = NDArray[np.float64]
-
-EQUILATERAL = np.sqrt(3.0) / 4.0  # area of a triangle whose sides are 1
 
 
 def distortion(mesh: GarmentMesh, metric: Array) -> Array:

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.remesh.distortion import EQUILATERAL
 from muslin.sim.remesh.gradation import limit_gradation
-from muslin.sim.remesh.metric import area_density
+from muslin.sim.remesh.metric import triangles_asked
 from muslin.sim.remesh.settings import RemeshSettings
 from muslin.sim.remesh.sizing import sizing_field
 
@@ -38,6 +37,5 @@ def with_mean_area(mesh: GarmentMesh, metric: Array, area: float) -> Array:
     """
     if not (np.isfinite(area) and area > 0.0):
         raise InputError(f"target area = {area:g} m^2: must be positive; give a mean triangle area in m^2")
-    density = area_density(metric[mesh.panel_faces].mean(axis=1))
-    count = float((mesh.face_areas * density).sum()) / EQUILATERAL
+    count = float(triangles_asked(mesh, metric).sum())
     return metric * (float(mesh.face_areas.sum()) / area / count)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.remesh.metric import area_density
+from muslin.sim.remesh.metric import area_density, triangles_asked
 from muslin.sim.remesh.panel_space import PanelSpace
 
 FINE = 0.6  # length in the metric below which boundary edges count as finer than what is asked for
@@ -47,11 +47,7 @@ class Field:
         if self._tree is not None:
             graded = self._graded(metric, space.lift(mesh.panel_vertices, mesh.panel_vertex_panel))
             plain, finer = (
-                np.bincount(
-                    mesh.face_panel,
-                    mesh.face_areas * area_density(field[mesh.panel_faces].mean(axis=1)),
-                    panels,
-                )
+                np.bincount(mesh.face_panel, triangles_asked(mesh, field), panels)
                 for field in (metric, graded)
             )
             self._scale = plain / finer

@@ -20,6 +20,8 @@ from muslin.garments.mesh import GarmentMesh
 
 Array = NDArray[np.float64]
 
+EQUILATERAL = np.sqrt(3.0) / 4.0  # area of a triangle whose sides are 1
+
 SINGULAR = 1e-14
 """Smaller over larger eigenvalue at which a sum of two metrics counts as of rank one."""
 
@@ -178,6 +180,12 @@ def area_density(metric: Array) -> Array:
     """
     determinant = metric[..., 0, 0] * metric[..., 1, 1] - metric[..., 0, 1] ** 2
     return np.sqrt(np.maximum(determinant, 0.0))
+
+
+def triangles_asked(mesh: GarmentMesh, metric: Array) -> Array:
+    """(F,) 4 / sqrt(3) A_f sqrt(det M_f): how many equilateral triangles with edges of size 1 the metric
+    (P, 2, 2) at panel vertices asks for in each triangle, M_f its mean there."""
+    return mesh.face_areas * area_density(metric[mesh.panel_faces].mean(axis=1)) / EQUILATERAL
 
 
 def faces_to_vertices(mesh: GarmentMesh, face_metric: Array) -> Array:

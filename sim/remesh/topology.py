@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.remesh.distortion import EQUILATERAL, distortion, forced, least_quality
+from muslin.sim.remesh.distortion import distortion, forced, least_quality
 from muslin.sim.remesh.field import Field
 from muslin.sim.remesh.fill import Filling, fill
-from muslin.sim.remesh.metric import area_density, uniform
+from muslin.sim.remesh.metric import area_density, triangles_asked, uniform
 from muslin.sim.remesh.panel_space import PanelSpace
 from muslin.sim.remesh.rim import Rim, sample_rim
 from muslin.sim.remesh.rings import rings
@@ -103,13 +103,15 @@ def remesh(
     if not max_distortion > 1.0:
         raise InputError(f"max_distortion = {max_distortion:g}: must be more than 1, which is equilateral")
     metric = _metric(mesh, target)
-    _check_room(mesh, metric)
+    wanted = np.zeros(len(mesh.panel_names))
+    np.add.at(wanted, mesh.face_panel, triangles_asked(mesh, metric))
+    _check_room(mesh, wanted)
     space = PanelSpace(mesh)
     rng = np.random.default_rng(seed)
     enough = least_quality(min(max_distortion, MENDED))
     reached = np.inf
     for _ in range(ATTEMPTS):
-        found, field = _draw(mesh, positions, metric, space, enough, rng)
+        found, field = _draw(mesh, positions, metric, wanted, space, enough, rng)
         local = field.at(found.mesh.panel_vertices, found.mesh.panel_vertex_panel)
         shape = distortion(found.mesh, local)
         worst = float(shape.max())
@@ -128,32 +130,25 @@ def _draw(
     mesh: GarmentMesh,
     positions: NDArray[np.float64],
     metric: NDArray[np.float64],
+    triangles: NDArray[np.float64],
     space: PanelSpace,
     enough: float,
     rng: np.random.Generator,
 ) -> tuple[Remeshed, Field]:
-    """One triangulation, and the metric that it follows."""
+    """One triangulation of so many triangles a panel, and the metric that it follows."""
     rim = sample_rim(mesh, metric, rng, JITTER)
     panel = mesh.face_panel[rim.face]
     field = Field(mesh, metric, space, space.lift(rim.points, panel), rim.spacing)
     boundary = rings(rim.points, rim.after, panel)
     # F = 2 I + B - 2 of a disk with I vertices inside and B on its boundary; a hole adds 2.
     nodes = np.bincount(boundary.panel, boundary.length - 2.0, minlength=len(mesh.panel_names))
-    wanted = np.maximum(np.round(0.5 * (_faces_wanted(mesh, metric) - nodes)), 0.0).astype(np.int64)
+    wanted = np.maximum(np.round(0.5 * (triangles - nodes)), 0.0).astype(np.int64)
     filling = fill(rim.points, panel, boundary, wanted, field.at, enough, rng)
     return _sewn(mesh, np.asarray(positions, dtype=np.float64), space, rim, filling), field
 
 
-def _faces_wanted(mesh: GarmentMesh, metric: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How many triangles each panel is to have."""
-    density = area_density(metric[mesh.panel_faces].mean(axis=1)) / EQUILATERAL
-    wanted = np.zeros(len(mesh.panel_names))
-    np.add.at(wanted, mesh.face_panel, mesh.face_areas * density)
-    return wanted
-
-
-def _check_room(mesh: GarmentMesh, metric: NDArray[np.float64]) -> None:
-    wanted = _faces_wanted(mesh, metric)
+def _check_room(mesh: GarmentMesh, wanted: NDArray[np.float64]) -> None:
+    """InputError if a panel is to have less than one triangle; wanted: (panels,) triangles of each."""
     panel = int(np.argmin(wanted))
     if wanted[panel] < 1.0:
         area = mesh.face_areas[mesh.face_panel == panel].sum()
