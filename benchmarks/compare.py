@@ -118,10 +118,7 @@ def table(results: list[Result]) -> str:
         lines.append(f"| {result.contender.name} | {' | '.join(cells)} |")
     lines.append("")
     for result in results:
-        versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
-        lines.append(f"- **{result.contender.name}** ({versions}). {result.contender.notes}")
-        if result.failure is not None:
-            lines.append(f"  It did not get through: {result.failure.splitlines()[-1]}")
+        lines += result.contender.footnote(result.versions, result.failure)
     return "\n".join(lines) + "\n"
 
 

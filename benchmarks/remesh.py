@@ -180,10 +180,7 @@ def table(cases: Sequence[Case], results: list[Result]) -> str:
             lines.append(f"| {result.remesher.name} | {' | '.join(cells)} |")
     lines.append("")
     for result in results:
-        versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
-        lines.append(f"- **{result.remesher.name}** ({versions}). {result.remesher.notes}")
-        if result.failure is not None:
-            lines.append(f"  It did not get through: {result.failure.splitlines()[-1]}")
+        lines += result.remesher.footnote(result.versions, result.failure)
     return "\n".join(lines) + "\n"
 
 

@@ -19,6 +19,15 @@ class Contender:
     package: str
     notes: str
 
+    def footnote(self, versions: dict[str, str], failure: str | None) -> list[str]:
+        """Lines below a table: in which versions it ran, its notes, and how it ended if it did not get
+        through."""
+        ran = ", ".join(f"{name} {version}" for name, version in versions.items())
+        lines = [f"- **{self.name}** ({ran}). {self.notes}"]
+        if failure is not None:
+            lines.append(f"  It did not get through: {failure.splitlines()[-1]}")
+        return lines
+
     def interpreter(self, environments: Path) -> Path:
         """The Python that it runs with."""
         if self.environment is None:

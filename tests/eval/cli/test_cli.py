@@ -8,27 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from typer.testing import CliRunner
 
-from muslin.eval.cli.app import app
 from muslin.sim.dataset.reader import open_dataset, write_dataset
+from tests.eval.cli.commands import muslin, refused
 
 COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "remesh")
 COMMANDS += ("render", "view")
-
-
-def muslin(*arguments, code: int = 0):
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert result.exit_code == code, (result.output, result.exception)
-    return result
-
-
-def refused(*arguments, says: str):
-    """Exit code 2, one line on standard error, no traceback."""
-    result = muslin(*arguments, code=2)
-    assert says in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert "Traceback" not in result.output
 
 
 @pytest.fixture

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from muslin.eval.cli import remesh as command
-from muslin.eval.cli.app import app
 from muslin.garments.designs.tee import TEE
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.obj import read_garment, write_garment
@@ -20,18 +18,15 @@ from muslin.sim.dataset.intersections import find_crossings
 from muslin.sim.dataset.reader import write_dataset
 from muslin.sim.dataset.sample import BodyTrack
 from muslin.sim.remesh.topology import MAX_DISTORTION
+from tests.eval.cli.commands import muslin, refused
 
 
-def muslin(*arguments, code: int = 0):
-    result = CliRunner().invoke(app, [str(argument) for argument in ("remesh", *arguments)])
-    assert result.exit_code == code, (result.output, result.exception)
-    return result
+def remesh(*arguments, code: int = 0):
+    return muslin("remesh", *arguments, code=code)
 
 
-def refused(*arguments, says: str):
-    result = muslin(*arguments, code=2)
-    assert says in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
+def refuses(*arguments, says: str):
+    refused("remesh", *arguments, says=says)
 
 
 def drape(path: Path) -> tuple[GarmentMesh, np.ndarray]:
@@ -55,7 +50,7 @@ def panels(tmp_path) -> Path:
 
 def test_a_sample_is_remeshed_off_its_body(dataset, tmp_path, make_sample):
     out = tmp_path / "new" / "out.obj"
-    line = muslin(dataset / "samples" / "still.zarr", "--target-area", 1e-3, "--out", out).output
+    line = remesh(dataset / "samples" / "still.zarr", "--target-area", 1e-3, "--out", out).output
     mesh, positions = drape(out)
     assert mesh.face_areas.mean() == pytest.approx(1e-3, rel=0.01)
     np.testing.assert_allclose(positions[:, 1], 0.21, atol=1e-6)
@@ -66,9 +61,9 @@ def test_a_sample_is_remeshed_off_its_body(dataset, tmp_path, make_sample):
 
 
 def test_a_frame_of_a_sequence(dataset, tmp_path):
-    muslin(dataset, "--sample", "moving", "--frame", 2, "--target-area", 2e-3, "--out", tmp_path / "f.obj")
+    remesh(dataset, "--sample", "moving", "--frame", 2, "--target-area", 2e-3, "--out", tmp_path / "f.obj")
     np.testing.assert_allclose(drape(tmp_path / "f.obj")[1][:, 1], 0.23, atol=1e-6)
-    refused(
+    refuses(
         *(dataset, "--sample", "moving", "--frame", 3, "--target-area", 2e-3, "--out", tmp_path / "g.obj"),
         says="frames 0 to 2",
     )
@@ -76,8 +71,8 @@ def test_a_frame_of_a_sequence(dataset, tmp_path):
 
 def test_seeds_repeat_and_topologies_are_numbered(dataset, tmp_path):
     common = (dataset, "--sample", "still", "--target-area", 2e-3)
-    muslin(*common, "--seed", 3, "--topologies", 2, "--out", tmp_path / "t.obj")
-    muslin(*common, "--seed", 4, "--out", tmp_path / "alone.obj")
+    remesh(*common, "--seed", 3, "--topologies", 2, "--out", tmp_path / "t.obj")
+    remesh(*common, "--seed", 4, "--out", tmp_path / "alone.obj")
     files = sorted(path.name for path in tmp_path.glob("t*.obj"))
     assert files == ["t_3.obj", "t_4.obj"]
     first, second, alone = (tmp_path / name for name in ("t_3.obj", "t_4.obj", "alone.obj"))
@@ -89,7 +84,7 @@ def test_seeds_repeat_and_topologies_are_numbered(dataset, tmp_path):
 
 def test_panels_alone_and_targets_of_single_panels(panels, tmp_path):
     out = tmp_path / "out.obj"
-    muslin(panels, "--target-area", 6e-4, "--panel-area", "front=2e-4", "--out", out)
+    remesh(panels, "--target-area", 6e-4, "--panel-area", "front=2e-4", "--out", out)
     mesh, positions = read_garment(out)
     assert positions is None
     for panel, name in enumerate(mesh.panel_names):
@@ -104,7 +99,7 @@ def test_a_garment_file_with_a_fold_is_refined_there(tmp_path, make_sample):
     bend = 0.05 * np.cos(np.clip((x - 0.4) / 0.05, -0.5 * np.pi, 0.5 * np.pi))
     write_garment(garment, tmp_path / "fold.obj", np.stack([x, bend, -y], axis=1))
     arguments = (tmp_path / "fold.obj", "--target-area", 1e-3, "--refine-angle", 0.2, "--aspect-min", 0.5)
-    muslin(*arguments, "--size-max", 0.1, "--out", tmp_path / "out.obj")
+    remesh(*arguments, "--size-max", 0.1, "--out", tmp_path / "out.obj")
     mesh, _ = drape(tmp_path / "out.obj")
     middle = np.abs(mesh.panel_vertices[mesh.panel_faces].mean(axis=1)[:, 0] - 0.4)
     assert mesh.face_areas.mean() == pytest.approx(1e-3, rel=0.02)
@@ -120,7 +115,7 @@ def test_the_binding_carries_skinning_weights(tmp_path, make_sample):
     upright = np.stack([x, 1.0 - z, np.full_like(x, 0.6)], axis=1)[None]
     write_dataset(tmp_path / "data", [replace(sample, positions=upright, body=track)])
     out = tmp_path / "out.obj"
-    muslin(tmp_path / "data", "--target-area", 2e-3, "--binding", "--interpolate", "--out", out)
+    remesh(tmp_path / "data", "--target-area", 2e-3, "--binding", "--interpolate", "--out", out)
     mesh, positions = drape(out)
     with np.load(out.with_suffix(".npz")) as found:
         corners, weights, skinning = (found[key] for key in ("source_vertices", "source_weights", "skinning"))
@@ -132,7 +127,7 @@ def test_the_binding_carries_skinning_weights(tmp_path, make_sample):
 
 def test_a_source_that_crosses_the_body_is_remeshed_with_a_note(tmp_path, make_sample):
     write_dataset(tmp_path / "data", [make_sample("cut", height=0.1, n=21)])
-    result = muslin(tmp_path / "data", "--target-area", 2e-3, "--out", tmp_path / "out.obj")
+    result = remesh(tmp_path / "data", "--target-area", 2e-3, "--out", tmp_path / "out.obj")
     assert "intersections itself" in result.stderr
     np.testing.assert_allclose(drape(tmp_path / "out.obj")[1][:, 1], 0.1, atol=1e-6)
 
@@ -140,20 +135,20 @@ def test_a_source_that_crosses_the_body_is_remeshed_with_a_note(tmp_path, make_s
 def test_what_is_wrong_is_said_in_a_line(dataset, panels, tmp_path):
     out = ("--out", tmp_path / "out.obj")
     area = ("--target-area", 4e-4)
-    refused(panels, *area, "--out", tmp_path / "out.ply", says="written as .obj")
-    refused(dataset, *area, *out, says="--sample")
-    refused(dataset, "--sample", "nobody", *area, *out, says="no sample")
-    refused(tmp_path / "none.obj", *area, *out, says="no such file")
-    refused(panels, *out, says="--target-area")
-    refused(panels, "--target-area", -1, *out, says="must be positive")
-    refused(panels, *area, "--panel-area", "collar=1e-4", *out, says="no such panel")
-    refused(panels, *area, "--panel-area", "front", *out, says="NAME=AREA")
-    refused(panels, *area, "--size-min", 0.01, *out, says="--refine-angle")
-    refused(panels, *area, "--refine-angle", 0.3, *out, says="no drape")
-    refused(dataset, "--sample", "still", "--refine-angle", 0.3, "--size-min", 0.3, *out, says="size_min")
-    refused(panels, *area, "--max-distortion", 1, *out, says="more than 1")
+    refuses(panels, *area, "--out", tmp_path / "out.ply", says="written as .obj")
+    refuses(dataset, *area, *out, says="--sample")
+    refuses(dataset, "--sample", "nobody", *area, *out, says="no sample")
+    refuses(tmp_path / "none.obj", *area, *out, says="no such file")
+    refuses(panels, *out, says="--target-area")
+    refuses(panels, "--target-area", -1, *out, says="must be positive")
+    refuses(panels, *area, "--panel-area", "collar=1e-4", *out, says="no such panel")
+    refuses(panels, *area, "--panel-area", "front", *out, says="NAME=AREA")
+    refuses(panels, *area, "--size-min", 0.01, *out, says="--refine-angle")
+    refuses(panels, *area, "--refine-angle", 0.3, *out, says="no drape")
+    refuses(dataset, "--sample", "still", "--refine-angle", 0.3, "--size-min", 0.3, *out, says="size_min")
+    refuses(panels, *area, "--max-distortion", 1, *out, says="more than 1")
     (tmp_path / "out.obj").write_text("mine")
-    refused(panels, *area, *out, says="is there already")
+    refuses(panels, *area, *out, says="is there already")
     assert (tmp_path / "out.obj").read_text() == "mine"
 
 
