@@ -5,21 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from muslin.eval.material_points import MaterialPoints
-from muslin.eval.meshes import check_mesh
 from muslin.eval.metrics.accumulate import ErrorAccumulator, PenetrationAccumulator
 from muslin.eval.metrics.hausdorff import hausdorff
-from muslin.eval.metrics.penetration import Penetration, is_closed, signed_distances
+from muslin.eval.metrics.penetration import Penetration, signed_distances
 from muslin.eval.metrics.surface_sampling import surface_distance
 from muslin.eval.metrics.velocity import velocity_errors
 from muslin.eval.metrics.vertex import Statistics, vertex_areas, vertex_errors
-from muslin.eval.subjects import Track, matched, open_subject
+from muslin.eval.read.options import ReadOptions
+from muslin.eval.read.pairing import paired
+from muslin.eval.read.subject import matched, open_subject
+from muslin.eval.read.track import Track
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.sample import Sample
 
@@ -139,6 +140,9 @@ def compare(
     fps: float | None = None,
     surface_frames: int = SURFACE_FRAMES,
     progress: Progress | None = None,
+    prediction_options: ReadOptions | None = None,
+    truth_options: ReadOptions | None = None,
+    vertices_correspond: bool = False,
 ) -> Comparison:
     """Compare two datasets, samples, mesh files or folders of meshes.
 
@@ -149,15 +153,20 @@ def compare(
     same panel-space coordinates. A velocity from frame t to t + 1 is that of the truth's vertices at t + 1;
     where a side has another topology at t, its position there is looked up by panel space too.
 
-    fps              frames per second of folders of meshes; None leaves velocity errors out
-    surface_frames   most frames of a sequence that get surface distances, evenly spread (they cost most)
+    fps                   frames per second of folders of meshes; None leaves velocity errors out
+    surface_frames        most frames of a sequence that get surface distances, evenly spread (they cost most)
+    prediction_options    how files of the prediction are read (fps then stands there), and
+    truth_options         those of the truth
+    vertices_correspond   vertex k is the same point on both sides wherever the vertex counts agree, although
+                          the triangles differ
 
     Raises InputError for missing, empty, non-manifold or non-finite meshes, for datasets with nothing in
     common, and for sequences of different length or rate.
     """
     if surface_frames < 1:
         raise InputError(f"surface_frames = {surface_frames}: must be 1 or more")
-    first, second = open_subject(prediction, fps), open_subject(truth, fps)
+    second = open_subject(truth, options=truth_options or ReadOptions(fps=fps))
+    first = open_subject(prediction, options=prediction_options or ReadOptions(fps=fps), ids=second.ids)
     pairs, left_first, left_second = matched(first, second)
     totals, frames = Totals(), 0
     notes: list[str] = []
@@ -165,7 +174,7 @@ def compare(
     for done, (a, b) in enumerate(pairs):
         if progress is not None:
             progress(done, len(pairs), b)
-        score, part, remarks = _score(first.load(a), second.load(b), surface_frames)
+        score, part, remarks = _score(first.load(a), second.load(b), surface_frames, vertices_correspond)
         totals.merge(part)
         scores.append(score)
         notes += [remark for remark in remarks if remark not in notes]
@@ -186,17 +195,12 @@ def compare(
     )
 
 
-def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairScore, Totals, list[str]]:
-    for track in (prediction, truth):
-        for _, run in groupby(range(track.num_frames), key=lambda t: id(track.faces[t])):
-            same = list(run)
-            check_mesh(np.stack([track.positions[t] for t in same]), track.faces[same[0]], track.name)
+def _score(
+    prediction: Track, truth: Track, surface_frames: int, vertices_correspond: bool
+) -> tuple[PairScore, Totals, list[str]]:
+    both = paired(prediction, truth)
+    prediction, truth = both.prediction, both.truth
     T = truth.num_frames
-    if prediction.num_frames != T:
-        raise InputError(
-            f"{prediction.name} has {prediction.num_frames} frames and {truth.name} has {T}; "
-            "give sequences of one length"
-        )
     if T > 1 and prediction.fps != truth.fps:
         if prediction.fps is None or truth.fps is None:
             unknown = prediction if prediction.fps is None else truth
@@ -209,8 +213,8 @@ def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairSc
             "resample one of them"
         )
     totals = Totals()
-    notes: list[str] = []
-    _score_vertices(prediction, truth, totals, notes)
+    notes = list(both.notes)
+    _score_vertices(prediction, truth, totals, notes, vertices_correspond)
     chosen = np.unique(np.linspace(0, T - 1, min(T, surface_frames)).round().astype(int))
     if len(chosen) < T:
         notes.append(f"surface distances of {len(chosen)} of {T} frames of a sequence, evenly spread")
@@ -225,8 +229,10 @@ def _score(prediction: Track, truth: Track, surface_frames: int) -> tuple[PairSc
     return _pair(prediction, truth, totals, chosen), totals, notes
 
 
-def _score_vertices(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
-    points, T = MaterialPoints(), truth.num_frames
+def _score_vertices(
+    prediction: Track, truth: Track, totals: Totals, notes: list[str], vertices_correspond: bool
+) -> None:
+    points, T = MaterialPoints(vertices_correspond), truth.num_frames
     try:
         seen = [points.positions(prediction, t, truth, t) for t in range(T)]
     except InputError as error:
@@ -269,16 +275,16 @@ def _score_velocities(
 
 
 def _score_penetration(prediction: Track, truth: Track, totals: Totals, notes: list[str]) -> None:
-    sample = truth.sample
-    if sample is None or not len(sample.body_faces):
+    body = truth.body
+    if body is None:
         notes.append("penetration is null: the truth has no body")
-    elif not is_closed(sample.body_faces):
+    elif not body.closed:
         notes.append("penetration is null: the truth's body or obstacle is not closed")
     else:
         for t in range(truth.num_frames):
-            body = sample.body_vertices(t)
-            totals.predicted.update(signed_distances(prediction.positions[t], body, sample.body_faces))
-            totals.true.update(signed_distances(truth.positions[t], body, sample.body_faces))
+            now = body.vertices(t)
+            totals.predicted.update(signed_distances(prediction.positions[t], now, body.faces))
+            totals.true.update(signed_distances(truth.positions[t], now, body.faces))
 
 
 def _pair(prediction: Track, truth: Track, totals: Totals, chosen: np.ndarray) -> PairScore:

@@ -11,7 +11,8 @@ from muslin.eval.compare import Comparison, PairScore
 from muslin.eval.metrics.surface_sampling import point_to_surface
 from muslin.eval.page import column, number, picture_source, render_page, tile
 from muslin.eval.plots import Line, line_plot
-from muslin.eval.subjects import Track, open_subject
+from muslin.eval.read.subject import open_subject
+from muslin.eval.read.track import Track
 from muslin.sim.view.camera import frame_camera
 from muslin.sim.view.heatmap import colours, with_bar
 from muslin.sim.view.layer import OBSTACLE, SKIN, Layer
@@ -182,10 +183,11 @@ def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
     high = max(float(np.quantile(distance, 0.99)), 1e-3)
     layers = []
     azimuth = AZIMUTH
-    sample = truth.sample
-    if sample is not None and len(sample.body_faces):
-        skin = SKIN if sample.body is not None else OBSTACLE
-        layers.append(Layer(sample.body_vertices(frame), sample.body_faces, np.array(skin)))
+    sample, body = truth.sample, truth.body
+    if body is not None:
+        skin = SKIN if sample is not None and sample.body is not None else OBSTACLE
+        layers.append(Layer(body.vertices(frame), body.faces, np.array(skin)))
+    if sample is not None:
         azimuth += facing(sample, frame)
     shades = colours(distance, 0.0, high)
     layers.append(Layer(positions, prediction.faces[frame], shades, sheet=True, gloss=0.0, flat_light=True))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.subjects import open_subject
+from muslin.eval.read.subject import open_subject
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.obj import read_garment

@@ -28,7 +28,7 @@ def export(
       muslin export mesh.obj --format ply --out out/ply
     """
     from muslin.eval.cli.progress import progress_bar
-    from muslin.eval.meshes import check_mesh
+    from muslin.eval.read.check import check_mesh
     from muslin.sim.dataset.export import export_dataset, export_parts
     from muslin.sim.dataset.parts import read_mesh
 

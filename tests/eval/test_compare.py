@@ -9,7 +9,8 @@ import pytest
 import trimesh
 
 from muslin.eval.compare import compare
-from muslin.eval.meshes import check_mesh, read_mesh
+from muslin.eval.read.check import check_mesh
+from muslin.eval.read.meshes import read_mesh
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.reader import write_dataset
 

@@ -10,7 +10,7 @@ import pytest
 
 from muslin.eval.compare import compare
 from muslin.eval.comparison_report import heat_map
-from muslin.eval.subjects import open_subject
+from muslin.eval.read.subject import open_subject
 from muslin.garments import catalogue
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.obj import write_garment

@@ -1,43 +1,23 @@
-"""What can be compared: datasets, samples, mesh files and folders of meshes, as moving surfaces."""
+"""What can be compared: datasets, samples, files of moving surfaces and folders of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from muslin.eval.meshes import MESH_SUFFIXES, read_frames
+from muslin.eval.read.folder import sources_in
+from muslin.eval.read.formats import read_file
+from muslin.eval.read.options import ReadOptions, track_of
+from muslin.eval.read.track import Frames, MovingSurface, Track
 from muslin.garments.errors import InputError
-from muslin.garments.mesh import GarmentMesh
 from muslin.sim.dataset import store
 from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.dataset.schema import HEADER, SAMPLES, SUFFIX
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """One moving surface, whose topology may change over time.
-
-    positions   a frame: (V_t, 3), metres
-    faces       a frame: (F_t, 3); frames of one topology share one object
-    garments    a frame: its mesh with panels; empty where panels are not known
-    sample      what it came from, if it was one
-    """
-
-    name: str
-    positions: Sequence[np.ndarray]
-    faces: Sequence[np.ndarray]
-    garments: Sequence[GarmentMesh] = ()
-    fps: float | None = None
-    sample: Sample | None = None
-
-    @property
-    def num_frames(self) -> int:
-        return len(self.positions)
 
 
 @dataclass(frozen=True)
@@ -55,13 +35,23 @@ class Subject:
     load: Callable[[str], Track]
 
 
-def open_subject(path: str | Path, fps: float | None = None) -> Subject:
-    """A dataset, one sample, a folder of mesh files (a sequence, in order of name), or a mesh file.
+def open_subject(
+    path: str | Path,
+    fps: float | None = None,
+    *,
+    options: ReadOptions | None = None,
+    ids: Collection[str] = (),
+) -> Subject:
+    """A dataset, one sample, a file of any format of `formats`, or a folder of such files.
 
-    fps    frames per second of a folder of mesh files; None leaves velocities out
+    A folder holds one sequence of mesh files, or a file or subfolder a sample, each named as its sample.
+
+    fps       short for ReadOptions(fps=fps): frames per second of files that do not say
+    options   how files are read; datasets know all of that themselves
+    ids       names of samples: a folder of mesh files named so holds drapes, not frames of one sequence
     Raises InputError if it is none of these.
     """
-    root = Path(path)
+    root, how = Path(path), options or ReadOptions(fps=fps)
     if not root.exists():
         raise InputError(
             f"{root}: no such file or folder; give a dataset, a sample, a mesh or a folder of meshes"
@@ -72,20 +62,12 @@ def open_subject(path: str | Path, fps: float | None = None) -> Subject:
         sample_id = root.name.removesuffix(SUFFIX)
         dataset = _dataset(root.parent.parent)
         return Subject(root, (sample_id,), {sample_id: dataset.keys[sample_id]}, dataset.load)
-    files = [root] if root.is_file() else _mesh_files(root)
+    sources = {root.stem: lambda: read_file(root)} if root.is_file() else sources_in(root, frozenset(ids))
 
     def load(name: str) -> Track:
-        frames = read_frames(files)
-        known = [frame.garment for frame in frames if frame.garment is not None]
-        return Track(
-            name,
-            [frame.vertices for frame in frames],
-            [frame.faces for frame in frames],
-            known if len(known) == len(frames) else (),
-            fps if len(files) > 1 else None,
-        )
+        return track_of(name, sources[name](), how)
 
-    return Subject(root, (root.stem,), {root.stem: ("mesh",)}, load)
+    return Subject(root, tuple(sources), {name: ("file", name) for name in sources}, load)
 
 
 def matched(prediction: Subject, truth: Subject) -> tuple[list[tuple[str, str]], list[str], list[str]]:
@@ -105,8 +87,9 @@ def matched(prediction: Subject, truth: Subject) -> tuple[list[tuple[str, str]],
             pairs.append((i, by_key.pop(prediction.keys[i])))
     if not pairs:
         raise InputError(
-            f"{prediction.path} and {truth.path} have no sample in common, neither by id nor by design, "
-            "shape, fabric and motion; compare datasets made from one configuration, or two single samples"
+            f"{prediction.path} and {truth.path} have no sample in common, neither by id "
+            f"({prediction.ids[0]} …, {truth.ids[0]} …) nor by design, shape, fabric and motion; compare "
+            "datasets made from one configuration, files named as the samples, or two single samples"
         )
     first, second = {a for a, _ in pairs}, {b for _, b in pairs}
     return pairs, [i for i in prediction.ids if i not in first], [i for i in truth.ids if i not in second]
@@ -116,15 +99,30 @@ def _dataset(root: Path) -> Subject:
     dataset = open_dataset(root)
     if not len(dataset):
         raise InputError(f"{root}: the dataset holds no sample; run `muslin generate` first")
+    return Subject(
+        root, dataset.ids, {i: _key(root, i) for i in dataset.ids}, lambda i: _sample_track(dataset[i])
+    )
 
-    def load(sample_id: str) -> Track:
-        sample = dataset[sample_id]
-        frames = range(sample.num_frames)
-        garments = [sample.frame_garment(t) for t in frames]
-        positions = [sample.frame_positions(t) for t in frames]
-        return Track(sample_id, positions, [g.faces for g in garments], garments, sample.fps, sample)
 
-    return Subject(root, dataset.ids, {i: _key(root, i) for i in dataset.ids}, load)
+def _sample_track(sample: Sample) -> Track:
+    garments = [sample.frame_garment(t) for t in range(sample.num_frames)]
+    body = None
+    if len(sample.body_faces):
+        body = MovingSurface(
+            f"the body of {sample.id}" if sample.body is not None else f"the obstacle of {sample.id}",
+            Frames(sample.num_frames, sample.body_vertices),
+            sample.body_faces,
+        )
+    return Track(
+        sample.id,
+        Frames(sample.num_frames, sample.frame_positions),
+        [garment.faces for garment in garments],
+        garments,
+        sample.fps,
+        sample,
+        body,
+        units_known=True,
+    )
 
 
 def _key(root: Path, sample_id: str) -> tuple[Any, ...]:
@@ -139,12 +137,3 @@ def _key(root: Path, sample_id: str) -> tuple[Any, ...]:
         meta["fabric"],
         meta["labels"].get("sequence", ""),
     )
-
-
-def _mesh_files(folder: Path) -> list[Path]:
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in MESH_SUFFIXES)
-    if not files:
-        raise InputError(
-            f"{folder}: neither a dataset (no {HEADER}) nor a folder of meshes ({', '.join(MESH_SUFFIXES)})"
-        )
-    return files
