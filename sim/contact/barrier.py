@@ -2,15 +2,18 @@
 
 For a pair at distance d < dhat, s = d / dhat,
 
-    E = kappa A m B(s),   B(s) = -(s - 1)^2 ln s,
+    E = kappa A m B(s),   B(s) = (1 - s)^3 / s,
 
 kappa in J/m^2, A the area of cloth in m^2 the pair stands for, m = 1 for vertex-triangle pairs. For edge-edge
 pairs m mollifies near-parallel edges, whose closest points jump: with c = |e1 x e2|^2 and
 c0 = 1e-3 |e1|^2 |e2|^2 at rest, m = (2 - c / c0) c / c0 below c0.
 The Hessian keeps the positive semi-definite part m B'' grad d grad d^T.
 
-Sources: Li et al. 2020, "Incremental potential contact" (barrier, mollifier); Li et al. 2023, "Convergent
-IPC" (area weights).
+At light contact, s near 1, B is that of Li et al., -(s - 1)^2 ln s, to leading order. Near s = 0 its force
+grows as s^-2 and not as s^-1, so taut cloth keeps a gap that a collider can advance by.
+
+Sources: Li et al. 2020, "Incremental potential contact" (mollifier, and what a barrier has to be); Li et al.
+2023, "Convergent IPC" (area weights).
 """
 
 import warp as wp
@@ -36,13 +39,8 @@ def barrier(s: wp.float64) -> wp.vec3d:
     """B, B' and B'' at s in (0, 1)."""
     one = wp.float64(1.0)
     two = wp.float64(2.0)
-    log = wp.log(s)
-    r = (s - one) / s
-    return wp.vec3d(
-        -(s - one) * (s - one) * log,
-        -two * (s - one) * log - (s - one) * r,
-        -two * log - wp.float64(4.0) * r + r * r,
-    )
+    r = one - s
+    return wp.vec3d(r * r * r / s, -r * r * (one + two * s) / (s * s), two / (s * s * s) - two)
 
 
 @wp.func

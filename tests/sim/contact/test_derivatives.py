@@ -132,7 +132,7 @@ def test_barrier_has_its_closed_form_and_ends_smoothly_at_the_range(make_soup):
     for share in (0.05, 0.3, 0.7, 0.999):
         points = point_over_triangle(share * RANGE)
         soup.search(points)
-        energy = -3.0 * area * (share - 1) ** 2 * np.log(share)
+        energy = 3.0 * area * (1 - share) ** 3 / share
         np.testing.assert_allclose(soup.energy(points, points), energy, rtol=1e-10)
     points = point_over_triangle(RANGE)
     soup.search(points)
