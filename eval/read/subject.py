@@ -60,8 +60,10 @@ def open_subject(
         return _dataset(root)
     if root.name.endswith(SUFFIX) and root.parent.name == SAMPLES:
         sample_id = root.name.removesuffix(SUFFIX)
-        dataset = _dataset(root.parent.parent)
-        return Subject(root, (sample_id,), {sample_id: dataset.keys[sample_id]}, dataset.load)
+        dataset = open_dataset(root.parent.parent)
+        # Not the keys of all its samples: a benchmark opens each of thousands so.
+        key = _key(dataset.root, sample_id)
+        return Subject(root, (sample_id,), {sample_id: key}, lambda i: _sample_track(dataset[i]))
     sources = {root.stem: lambda: read_file(root)} if root.is_file() else sources_in(root, frozenset(ids))
 
     def load(name: str) -> Track:
