@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from muslin.eval.cli.bench import bench
 from muslin.eval.cli.compare import evaluate
 from muslin.eval.cli.export import export
 from muslin.eval.cli.generate import generate
@@ -87,6 +88,7 @@ for name, command, summary in (
     ("verify", verify, "Count all intersections of a dataset again."),
     ("info", info, "What a dataset holds."),
     ("eval", evaluate, "Score a prediction against the truth."),
+    ("bench", bench, "Methods against each other by a protocol."),
     ("report", report, "A dataset as one HTML page."),
     ("export", export, "Samples as OBJ, PLY, GLB, USD, PC2 or NPZ."),
     ("pattern", pattern, "A sewing pattern as file, mesh or drawing."),

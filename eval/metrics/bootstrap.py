@@ -36,10 +36,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class Paired:
-    """A first method against a second on the same samples; figures of which lower is better.
+    """A first method against a second on the same samples.
 
-    difference     of the means, first minus second: negative where the first is better
-    first, second  samples on which each has the lower figure
+    difference     of the means, first minus second
+    first, second  samples on which each has the better figure
     equal          samples on which neither has
     """
 
@@ -140,6 +140,7 @@ def paired(
     confidence: float = CONFIDENCE,
     resamples: int = RESAMPLES,
     seed: int = 0,
+    lower_is_better: bool = True,
 ) -> Paired:
     """Two methods on the same samples: the interval of the mean of the differences, and who wins how often.
 
@@ -155,8 +156,9 @@ def paired(
             f"paired comparison of {a.shape} and {b.shape} figures; give both methods on the same samples"
         )
     difference = mean_interval(a - b, clusters, confidence, resamples, seed)
-    wins, losses = int((a < b).sum()), int((a > b).sum())
-    return Paired(difference, wins, losses, len(a) - wins - losses)
+    lower, higher = int((a < b).sum()), int((a > b).sum())
+    wins, losses = (lower, higher) if lower_is_better else (higher, lower)
+    return Paired(difference, wins, losses, len(a) - lower - higher)
 
 
 def _check(x: np.ndarray, clusters: Sequence[object] | None, confidence: float, resamples: int) -> None:

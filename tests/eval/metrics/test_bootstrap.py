@@ -113,6 +113,8 @@ def test_paired_counts_wins_and_ties():
     assert (found.first, found.second, found.equal) == (2, 1, 1)
     assert not found.decided
     swapped = paired([2.0, 2.0, 1.0, 9.0], [1.0, 2.0, 3.0, 4.0])
+    higher = paired([1.0, 2.0, 3.0, 4.0], [2.0, 2.0, 1.0, 9.0], lower_is_better=False)
+    assert (higher.first, higher.second, higher.difference) == (1, 2, found.difference)
     assert swapped.difference.mean == -found.difference.mean
 
 

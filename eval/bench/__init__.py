@@ -1,0 +1,1 @@
+"""Benchmarks: protocols that score any number of methods on the same samples."""

@@ -1,0 +1,93 @@
+"""A benchmark as one HTML page that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from muslin.eval.bench.curves import plots
+from muslin.eval.bench.draw import plot_svg
+from muslin.eval.bench.outcome import Outcome
+from muslin.eval.bench.scenes import scenes
+from muslin.eval.bench.tables import Filled, duels, fill
+from muslin.eval.bench.write import DUEL_HEADS, cell_text, duel_row
+from muslin.eval.page import column, duration, render_page, tile
+from muslin.eval.viewer.page import viewer
+
+NAMED = 12  # most samples that a note names
+
+
+def bench_report(outcome: Outcome) -> str:
+    """HTML: who was scored on how much, tables, figures, methods against each other, a player of samples."""
+    protocol = outcome.protocol
+    compared, scored = len(outcome.common(list(outcome.entries))), len(outcome.entries)
+    drawn = [plot for figure in protocol.figures for plot in plots(outcome, figure)]
+    return render_page(
+        "bench.html.j2",
+        title=f"muslin: {protocol.title}",
+        heading=protocol.title,
+        source=protocol.source,
+        truth=str(outcome.truth),
+        tiles=[
+            tile("methods", str(len(outcome.methods))),
+            tile("samples of the protocol", str(scored)),
+            tile("samples compared", str(compared), "" if compared == scored else "bad"),
+            tile("computing time", duration(outcome.seconds)),
+        ],
+        notes=_notes(outcome),
+        method_columns=[column("method", text=True), column("folder", text=True), *_counts()],
+        method_rows=[_method_row(outcome, name) for name in outcome.methods],
+        tables=[_table(fill(outcome, table)) for table in protocol.tables],
+        interval=f"{100 * protocol.bootstrap.confidence:g}%",
+        plots=[{"svg": plot_svg(plot), "caption": plot.title} for plot in drawn],
+        duel_columns=[column(name, text=k < 3) for k, name in enumerate(DUEL_HEADS)],
+        duel_rows=[duel_row(duel) for duel in duels(outcome)],
+        viewer=viewer(scenes(outcome)),
+        origin=_origin(outcome.origin),
+    )
+
+
+def _counts() -> list[dict[str, Any]]:
+    return [column("scored"), column("missing"), column("refused")]
+
+
+def _method_row(outcome: Outcome, name: str) -> list[str]:
+    missing, refused = outcome.missing(name), outcome.refused(name)
+    scored = len(outcome.entries) - len(missing) - len(refused)
+    return [name, str(outcome.methods[name].path), str(scored), str(len(missing)), str(len(refused))]
+
+
+def _notes(outcome: Outcome) -> list[str]:
+    notes = []
+    for name in outcome.methods:
+        if missing := outcome.missing(name):
+            notes.append(f"{name} lacks {len(missing)} samples: {_some(missing)}")
+        for sample, reason in list(outcome.refused(name).items())[:NAMED]:
+            notes.append(f"{name}, {sample}: not scored: {reason}")
+    if notes:
+        notes.append("every mean and comparison is over the samples that all methods have a score of")
+    said = {note for score in outcome.scores.values() for note in score.notes}
+    return notes + sorted(said)
+
+
+def _some(ids: Sequence[str]) -> str:
+    return ", ".join(ids[:NAMED]) + (" …" if len(ids) > NAMED else "")
+
+
+def _table(filled: Filled) -> dict[str, Any]:
+    uniform = all(len({cell.count for cell in cells}) == 1 for cells in filled.cells)
+    columns = [column(name, text=True) for name in filled.row_names]
+    columns += [column(", ".join(names)) for names in filled.columns]
+    columns += [column("samples")] if uniform else []
+    rows = []
+    for row, cells in zip(filled.rows, filled.cells, strict=True):
+        texts = [cell_text(cell, uniform) for cell in cells]
+        rows.append([*row, *texts, *([cells[0].count] if uniform else [])])
+    return {"title": filled.title, "columns": columns, "rows": rows}
+
+
+def _origin(origin: dict[str, Any]) -> str:
+    lines = [f"{name} {version}" for name, version in origin["versions"].items()]
+    lines += [f"metrics version {origin['metrics_version']}"]
+    lines += [f"dataset {origin['dataset']}", f"protocol {origin['protocol']}"]
+    return "\n".join(lines)
