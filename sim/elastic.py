@@ -82,9 +82,16 @@ class ElasticEnergy:
         wp.launch(bend_curvature, self.num_faces, bend, device=self.device)
 
     def add_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
+        self.add_stretch_value(x, inverse_dt, energy)
+        self.add_bend_value(x, inverse_dt, energy)
+
+    def add_stretch_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
         rate = self.damping * inverse_dt
         stretch = [x, self.stretch, self._strain, rate, energy]
         wp.launch(stretch_value, self.num_faces, stretch, device=self.device)
+
+    def add_bend_value(self, x: wp.array, inverse_dt: float, energy: wp.array) -> None:
+        rate = self.damping * inverse_dt
         self._fold(x)
         bend = [self.bend, self.bend_state, self._curvature, rate]
         wp.launch(bend_value, self.num_faces, [*bend, energy], device=self.device)
