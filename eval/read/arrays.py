@@ -44,7 +44,8 @@ def _mapped(path: Path) -> np.ndarray:
 def read_npz(path: Path) -> Content:
     """Vertices and faces by name (`named_arrays`); each array is kept once, in the file's precision."""
     with parsing(path, "a NumPy archive"):
-        return content_of(_Archive(path), path)
+        archive = _Archive(path)
+    return content_of(archive, path)
 
 
 class _Archive(Mapping[str, np.ndarray]):
@@ -59,7 +60,9 @@ class _Archive(Mapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._read:
-            self._read[name] = self._load(self._members[name])
+            entry = self._members[name]
+            with parsing(self._path, "a NumPy archive"):
+                self._read[name] = self._load(entry)
         return self._read[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +29,8 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 # What parsers raise on a damaged file.
 DAMAGE = (
     ValueError, TypeError, LookupError, AttributeError, ArithmeticError, NotImplementedError, AssertionError,
-    OSError, EOFError, MemoryError, RecursionError, SyntaxError, struct.error, zlib.error, zipfile.BadZipFile,
+    OSError, EOFError, MemoryError, RecursionError, SyntaxError, struct.error,
+    zlib.error, zipfile.BadZipFile, tokenize.TokenError,
 )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import trimesh
 from muslin.eval.read.check import check_mesh
 from muslin.eval.read.content import is_body, is_cloth, parsing
 from muslin.eval.read.mesh_headers import check_header
+from muslin.eval.read.stl import read_stl
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.obj import from_content
@@ -48,6 +49,8 @@ def read_mesh(path: Path) -> Surface:
     if suffix == ".obj":
         # trimesh would split vertices along uv seams
         found = _read_obj(path)
+    elif suffix == ".stl":
+        found = _sewn(read_stl(path))
     elif suffix in MESH_SUFFIXES:
         check_header(path)
         found = _read_glb(path) if suffix == ".glb" else _read_other(path)
@@ -74,8 +77,7 @@ def _read_other(path: Path) -> Surface:
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True)
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             raise InputError(f"{path}: holds no triangles; give a triangle mesh")
-        found = _surface(mesh)
-    return _sewn(found) if path.suffix.lower() == ".stl" else found
+        return _surface(mesh)
 
 
 def _read_glb(path: Path) -> Surface:
@@ -110,10 +112,11 @@ def _joined(parts: list[Surface]) -> Surface:
     )
 
 
-def _sewn(soup: Surface) -> Surface:
-    """Equal corners made one vertex, numbered by their first appearance."""
-    _, first, inverse = np.unique(soup.vertices, axis=0, return_index=True, return_inverse=True)
+def _sewn(corners: np.ndarray) -> Surface:
+    """Equal corners (F, 3, 3) made one vertex, numbered by their first appearance."""
+    points = corners.reshape(-1, 3)
+    _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
-    return Surface(soup.vertices[np.sort(first)], number[inverse.reshape(-1)][soup.faces])
+    return Surface(points[first[order]], number[inverse.reshape(-1, 3)])

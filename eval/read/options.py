@@ -45,6 +45,9 @@ class ReadOptions:
 
 def track_of(name: str, content: Content, options: ReadOptions) -> Track:
     """What a file holds, as a track in metres, y up. Raises InputError if options and file do not fit."""
+    for what, value in (("a unit", content.metres), ("frames per second", content.fps)):
+        if value is not None and not 0.0 < value < np.inf:
+            raise InputError(f"{name}: the file says {value} for {what}; it must be greater than zero")
     scale = options.scale or content.metres
     transform = _transform(scale or 1.0, options.up or content.up or "y")
     notes = content.notes

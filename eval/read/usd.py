@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from muslin.eval.read.content import Content, Up, cloth_and_body, parsing
+from muslin.eval.read.content import Content, Up, cloth_and_body
 from muslin.eval.read.polygons import fans
 from muslin.garments.errors import InputError
 
@@ -24,42 +28,32 @@ def read_usd(path: Path) -> Content:
     Raises InputError without usd-core, for a damaged file, and if it is not clear which mesh is the garment.
     """
     try:
-        from pxr import Tf, Usd, UsdGeom
+        from pxr import Usd, UsdGeom
     except ImportError as error:
         raise InputError(
             f"{path}: reading USD needs the package usd-core; pip install 'muslin[usd]'"
         ) from error
     _check_magic(path)
-    with parsing(path, "a USD file"):
-        try:
-            stage = Usd.Stage.Open(str(path))
-            meshes = {str(prim.GetPath()): prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)}
-        except Tf.ErrorException as error:
-            raise InputError(f"{path}: not readable as a USD file ({_line(error)})") from error
-        cloth, body = cloth_and_body(meshes, path, "mesh")
-        mesh = UsdGeom.Mesh(meshes[cloth])
-        times, step, notes = _times(mesh.GetPointsAttr().GetTimeSamples(), path)
-        beneath = None
-        if body is not None:
-            beneath = _content(UsdGeom.Mesh(meshes[body]), times, path)
-        rate = stage.GetTimeCodesPerSecond() if stage.HasAuthoredTimeCodesPerSecond() else None
-        up: Up | None = None
-        if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
-            up = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
-        metres = (
-            UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
-        )
-        found = _content(mesh, times, path)
-        return Content(
-            found.num_frames,
-            found.read,
-            found.faces,
-            body=beneath,
-            fps=rate / step if rate and len(times) > 1 else None,
-            metres=metres,
-            up=up,
-            notes=notes,
-        )
+    with _reading(path):
+        stage = Usd.Stage.Open(str(path))
+        meshes = {
+            str(prim.GetPath()): UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)
+        }
+    cloth, body = cloth_and_body(meshes, path, "mesh")
+    times, step, notes = _times(meshes[cloth].GetPointsAttr().GetTimeSamples(), path)
+    content = _content(stage, meshes[cloth], times, path)
+    rate = stage.GetTimeCodesPerSecond() if stage.HasAuthoredMetadata("timeCodesPerSecond") else None
+    up: Up | None = None
+    if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
+        up = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
+    return replace(
+        content,
+        body=None if body is None else _content(stage, meshes[body], times, path),
+        fps=rate / step if rate and len(times) > 1 else None,
+        metres=UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None,
+        up=up,
+        notes=notes,
+    )
 
 
 def _times(samples: list[float], path: Path) -> tuple[list[float | None], float, tuple[str, ...]]:
@@ -83,16 +77,18 @@ def _times(samples: list[float], path: Path) -> tuple[list[float | None], float,
     return [samples[0] + step * k for k in range(total)], step, notes
 
 
-def _content(mesh: Any, times: list[float | None], path: Path) -> Content:
+def _content(stage: Any, mesh: Any, times: list[float | None], path: Path) -> Content:
     from pxr import Usd, UsdGeom
 
     codes = [Usd.TimeCode.Default() if time is None else Usd.TimeCode(time) for time in times]
     where = f"{path}, {mesh.GetPath()}"
-    flip = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+    with _reading(path):
+        flip = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     faces: list[np.ndarray] = []
     before: tuple[Any, Any] | None = None
     for code in codes:
-        now = mesh.GetFaceVertexCountsAttr().Get(code), mesh.GetFaceVertexIndicesAttr().Get(code)
+        with _reading(path):
+            now = mesh.GetFaceVertexCountsAttr().Get(code), mesh.GetFaceVertexIndicesAttr().Get(code)
         if now[0] is None or now[1] is None:
             raise InputError(f"{where}: has no faces; export it as a mesh")
         if before is None or now != before:
@@ -101,16 +97,40 @@ def _content(mesh: Any, times: list[float | None], path: Path) -> Content:
             faces.append(faces[-1])
         before = now
 
-    def read(frame: int) -> np.ndarray:
-        points = mesh.GetPointsAttr().Get(codes[frame])
-        if points is None or not len(points):
-            raise InputError(f"{where}: has no points in frame {frame}; export it again")
-        to_world = np.array(mesh.ComputeLocalToWorldTransform(codes[frame]))
-        x = np.array(points, dtype=np.float64)
-        # USD's matrices multiply row vectors
-        return x if np.array_equal(to_world, np.eye(4)) else x @ to_world[:3, :3] + to_world[3, :3]
+    return Content(len(codes), partial(_points, stage, mesh, codes, path), faces)
 
-    return Content(len(codes), read, faces)
+
+def _points(stage: Any, mesh: Any, codes: list[Any], path: Path, frame: int) -> np.ndarray:
+    """(V, 3) in the world. The stage is passed along because a mesh dies with it."""
+    with _reading(path):
+        points = mesh.GetPointsAttr().Get(codes[frame])
+        to_world = np.array(mesh.ComputeLocalToWorldTransform(codes[frame]))
+    if points is None or not len(points):
+        raise InputError(f"{path}, {mesh.GetPath()}: has no points in frame {frame}; export it again")
+    x = np.array(points, dtype=np.float64)
+    # USD's matrices multiply row vectors
+    return x if np.array_equal(to_world, np.eye(4)) else x @ to_world[:3, :3] + to_world[3, :3]
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turn USD's errors, which come at any access to a damaged file, into an InputError."""
+    from pxr import Tf
+
+    try:
+        yield
+    except (Tf.ErrorException, RuntimeError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}: not readable as a USD file ({_said(error)}); give an intact file"
+        ) from error
+
+
+def _said(error: Exception) -> str:
+    try:
+        return " ".join(str(error).split())[:160]
+    except UnicodeDecodeError:
+        # USD quotes what it could not parse
+        return "it holds bytes that are no text"
 
 
 def _check_magic(path: Path) -> None:
@@ -120,7 +140,3 @@ def _check_magic(path: Path) -> None:
     allowed = (known,) if known else tuple(MAGIC.values())
     if not any(head.startswith(magic) for magic in allowed):
         raise InputError(f"{path}: not a USD file; it must begin with {' or '.join(map(repr, allowed))}")
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:160]
