@@ -1,23 +1,22 @@
-"""Whether two triangles intersect, in rational arithmetic: for the few pairs that rounding leaves open."""
+"""Whether two triangles intersect, in whole numbers of any size: for the pairs that rounding leaves open."""
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 APART, CROSSING, COPLANAR = 0, 1, 2
 
-Point = tuple[Fraction, ...]
+Point = tuple[int, ...]
 Triangle = tuple[Point, Point, Point]
 
 
 def triangles_meet(a: list[list[float]], b: list[list[float]]) -> int:
     """APART if the closed triangles have no common point, else CROSSING, or COPLANAR if in one plane.
 
-    a, b: three corners of three coordinates; every float is a rational number, so the answer is exact.
+    a, b: three corners of three coordinates. Every float is a whole number over a power of two; all are taken
+    times the largest of these, so the answer is exact.
     Closed triangles meet if and only if an edge of one meets the other. A triangle of no area has no plane:
     it is met as three segments, and never by another such triangle.
     """
-    first, second = _exact(a), _exact(b)
+    first, second = _whole(a, b)
     thin_a, thin_b = _normal(first) == (0, 0, 0), _normal(second) == (0, 0, 0)
     if thin_a and thin_b:
         return APART
@@ -30,9 +29,12 @@ def triangles_meet(a: list[list[float]], b: list[list[float]]) -> int:
     return COPLANAR if flat else CROSSING
 
 
-def _exact(corners: list[list[float]]) -> Triangle:
-    p, q, r = (tuple(Fraction(x) for x in corner) for corner in corners)
-    return p, q, r
+def _whole(a: list[list[float]], b: list[list[float]]) -> tuple[Triangle, Triangle]:
+    """Both triangles at one scale that makes every coordinate a whole number."""
+    ratios = [[x.as_integer_ratio() for x in corner] for corner in (*a, *b)]
+    scale = max(below for corner in ratios for _, below in corner)
+    p, q, r, s, t, u = (tuple(above * (scale // below) for above, below in corner) for corner in ratios)
+    return (p, q, r), (s, t, u)
 
 
 def _edges(t: Triangle) -> list[tuple[Point, Point]]:
@@ -55,7 +57,7 @@ def _meets_in_plane(p: Point, q: Point, t: Triangle) -> bool:
     dropped = max(range(3), key=lambda k: abs(normal[k]))
     kept = [k for k in range(3) if k != dropped]
 
-    def side(o: Point, x: Point, y: Point) -> Fraction:
+    def side(o: Point, x: Point, y: Point) -> int:
         i, j = kept
         return (x[i] - o[i]) * (y[j] - o[j]) - (x[j] - o[j]) * (y[i] - o[i])
 
@@ -79,9 +81,9 @@ def _overlap(p: Point, q: Point, s: Point, e: Point) -> bool:
     )
 
 
-def _height(p: Point, t: Triangle) -> Fraction:
+def _height(p: Point, t: Triangle) -> int:
     n = _normal(t)
-    return sum((n[k] * (p[k] - t[0][k]) for k in range(3)), Fraction(0))
+    return sum(n[k] * (p[k] - t[0][k]) for k in range(3))
 
 
 def _normal(t: Triangle) -> Point:

@@ -39,7 +39,7 @@ def intersecting_triangles(
     """All pairs of a triangle of A and a triangle of B with a common point; touching ones have one.
 
     Exact for the given float64 coordinates: pairs are parted by separating axes or joined by orientation
-    predicates where these are beyond their rounding error, and decided in rational arithmetic else.
+    predicates where these are beyond their rounding error, and decided in whole numbers else.
     Two triangles of no area never pair with one another.
 
     vertices (V, 3), faces (F, 3). Source: the filtered predicates of Shewchuk 1997; separating axes as
