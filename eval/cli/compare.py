@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -21,33 +21,96 @@ def evaluate(
         Path | None, typer.Option("--html", metavar="FILE", help="Write a report there, replacing the last.")
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", help="Frames per second of folders of mesh files.")
+        float | None, typer.Option("--fps", help="Frames per second of files that do not say.")
     ] = None,
+    body: Annotated[
+        Path | None,
+        typer.Option("--body", metavar="FILE", help="What TRUTH lies on, if it has no body; metres."),
+    ] = None,
+    faces: Annotated[
+        Path | None,
+        typer.Option("--faces", metavar="FILE", help="A mesh with the faces, for files that have none."),
+    ] = None,
+    scale: Annotated[
+        float | None, typer.Option("--scale", help="Metres a unit of PREDICTION's files, e.g. 0.01 for cm.")
+    ] = None,
+    truth_scale: Annotated[
+        float | None, typer.Option("--truth-scale", help="Metres a unit of TRUTH's files.")
+    ] = None,
+    up: Annotated[
+        Literal["y", "z"] | None, typer.Option("--up", help="The axis that is up in PREDICTION's files.")
+    ] = None,
+    vertices_correspond: Annotated[
+        bool,
+        typer.Option(
+            "--vertices-correspond",
+            help="Vertex k is the same point on both sides, although the triangles differ.",
+        ),
+    ] = False,
     surface_frames: Annotated[
         int, typer.Option("--surface-frames", min=1, help="Most frames of a sequence with surface distances.")
     ] = 24,
+    baseline: Annotated[
+        Path | None,
+        typer.Option("--baseline", metavar="FILE", help="Exit with 1 if a figure is worse than in there."),
+    ] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance",
+            metavar="PATH=REL",
+            help="How much worse, as a share; without PATH= of every error, by default 0.01. Repeatable.",
+        ),
+    ] = None,
+    new_baseline: Annotated[
+        Path | None,
+        typer.Option("--write-baseline", metavar="FILE", help="Write a baseline there, replacing the last."),
+    ] = None,
 ) -> None:
     """Score a prediction: vertex, velocity and surface errors, and how much is inside the body.
 
-    Either side is a dataset, one sample (DIR/samples/ID.zarr), a mesh file (.obj, .ply, .glb, .stl, .off) or
-    a folder of mesh files; their topology may change from frame to frame. Meshes of different topology get
-    vertex and velocity errors if both tell panel space and are of one pattern, else surface distances only.
+    Either side is a dataset, one sample (DIR/samples/ID.zarr), a file (.obj .ply .glb .stl .off .npy .npz
+    .pkl .pc2 .pc16 .usd .abc), a folder of meshes, or a folder with a file or a folder a sample, named as it;
+    their topology may change from frame to frame. Vertices without faces take those of the other side if the
+    counts agree. Meshes of different topology get vertex and velocity errors if both tell panel space and are
+    of one pattern, else surface distances only.
 
     \b
     Examples:
       muslin eval out/prediction out/demo --json eval.json --html eval.html
-      muslin eval mine.obj theirs.obj
       muslin eval frames_a/ frames_b/ --fps 30
+      muslin eval rollout.pkl out/demo/samples/walk.zarr --fps 30
+      muslin eval predictions/ out/demo --scale 0.01 --up z
+      muslin eval mine.npy theirs/Tshirt.pc16 --body body.npz
+      muslin eval out/prediction out/demo --baseline base.json --tolerance vertex_error_mm.mean=0.02
     """
     from muslin.eval.cli.progress import progress_bar
     from muslin.eval.compare import compare
     from muslin.eval.page import write_atomically
+    from muslin.eval.read.options import ReadOptions
+    from muslin.eval.regression import (
+        measured,
+        parse_tolerances,
+        read_baseline,
+        regressions,
+        write_baseline,
+    )
 
-    for file in (json_file, html_file):
+    limits = parse_tolerances(tolerance or [])
+    before = None if baseline is None else read_baseline(baseline)
+    for file in (json_file, html_file, new_baseline):
         if file is not None:
             make_parent(file)
     with progress_bar("eval") as update:
-        result = compare(prediction, truth, fps=fps, surface_frames=surface_frames, progress=update)
+        result = compare(
+            prediction,
+            truth,
+            surface_frames=surface_frames,
+            progress=update,
+            prediction_options=ReadOptions(fps, scale, up, faces),
+            truth_options=ReadOptions(fps, truth_scale, None, faces, body),
+            vertices_correspond=vertices_correspond,
+        )
     if json_file is not None:
         write_atomically(json_file, result.to_json().encode())
     if html_file is not None:
@@ -56,6 +119,15 @@ def evaluate(
         write_atomically(html_file, comparison_report(result).encode())
     for line in _summary(result.to_dict()):
         typer.echo(line)
+    found = measured(result.to_dict(), truth) if baseline or new_baseline else None
+    worse = regressions(before, found, limits) if before and found else []
+    if worse:
+        for row in worse:
+            typer.echo(f"  {row}", err=True)
+        typer.echo(f"muslin: {len(worse)} figures are worse than in {baseline}", err=True)
+        raise typer.Exit(1)
+    if new_baseline is not None and found is not None:
+        write_baseline(new_baseline, found)
 
 
 def _summary(figures: dict) -> list[str]:
