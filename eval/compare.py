@@ -19,7 +19,7 @@ from muslin.eval.metrics.velocity import velocity_errors
 from muslin.eval.metrics.vertex import Statistics, vertex_areas, vertex_errors
 from muslin.eval.read.options import ReadOptions
 from muslin.eval.read.pairing import paired
-from muslin.eval.read.subject import matched, open_subject
+from muslin.eval.read.subject import Subject, matched, open_subject
 from muslin.eval.read.track import Track
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.sample import Sample
@@ -106,7 +106,10 @@ class Totals:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Figures over all pairs, each pair's own, and what could not be compared."""
+    """Figures over all pairs, each pair's own, and what could not be compared.
+
+    subjects   prediction and truth, opened as they were for the figures
+    """
 
     prediction: str
     truth: str
@@ -116,6 +119,7 @@ class Comparison:
     unmatched_prediction: list[str]
     unmatched_truth: list[str]
     notes: list[str]
+    subjects: tuple[Subject, Subject]
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -192,6 +196,7 @@ def compare(
         unmatched_prediction=left_first,
         unmatched_truth=left_second,
         notes=notes,
+        subjects=(first, second),
     )
 
 

@@ -11,7 +11,7 @@ from muslin.eval.compare import Comparison, PairScore
 from muslin.eval.metrics.surface_sampling import point_to_surface
 from muslin.eval.page import column, number, picture_source, render_page, tile
 from muslin.eval.plots import Line, line_plot
-from muslin.eval.read.subject import open_subject
+from muslin.eval.read.pairing import paired
 from muslin.eval.read.track import Track
 from muslin.sim.view.camera import frame_camera
 from muslin.sim.view.heatmap import colours, with_bar
@@ -162,14 +162,14 @@ def _beta_plots(pairs: Sequence[PairScore]) -> list[dict[str, str]]:
 
 def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
     worst = sorted(comparison.pairs, key=lambda pair: -pair.figures["hausdorff_mm"])[:HEAT_MAPS]
-    predictions, truths = open_subject(comparison.prediction), open_subject(comparison.truth)
+    predictions, truths = comparison.subjects
     entries = []
     for pair in worst:
         frame = pair.frames.surface_frames[int(np.argmax(pair.frames.hausdorff))]
-        prediction, truth = predictions.load(pair.prediction), truths.load(pair.truth)
+        both = paired(predictions.load(pair.prediction), truths.load(pair.truth))
         entries.append(
             {
-                "picture": picture_source(heat_map(prediction, truth, frame)),
+                "picture": picture_source(heat_map(both.prediction, both.truth, frame)),
                 "caption": f"{_name(pair)}, frame {frame}: distance to the truth's surface, mm",
             }
         )
