@@ -1,10 +1,14 @@
 """Surface distances against closed forms, and against a slow, dense reference."""
 
+import igl
 import numpy as np
 import pytest
 import trimesh
 
-from muslin.eval.metrics.hausdorff import hausdorff, one_sided_hausdorff, point_triangle_distance
+from muslin.eval.metrics.closest import point_triangle_distance
+from muslin.eval.metrics.hausdorff import hausdorff, one_sided_hausdorff
+from muslin.eval.metrics.point_sets import chamfer, vertex_hausdorff
+from muslin.eval.metrics.surface_pair import compare_surfaces
 from muslin.eval.metrics.surface_sampling import point_to_surface, sample_surface, surface_distance
 from muslin.garments.errors import InputError
 
@@ -118,3 +122,68 @@ def test_empty_surfaces_are_refused():
         hausdorff(v, none, v, np.array([[0, 1, 2]]))
     with pytest.raises(InputError, match="area 0"):
         sample_surface(v, np.array([[0, 1, 2]]), 10)
+
+
+def test_standard_errors_are_as_large_as_the_spread_over_seeds():
+    v, f = sphere(1.0, 2)
+    w = v * (1 + 0.1 * np.sin(4 * v[:, :1]))
+    exact = surface_distance(v, f, w, f, samples=400_000).mean
+    found = [surface_distance(v, f, w, f, samples=800, seed=seed) for seed in range(40)]
+    actual = np.sqrt(np.mean([(one.mean - exact) ** 2 for one in found]))
+    stated = np.sqrt(np.mean([one.mean_error**2 for one in found]))
+    assert 0.6 < stated / actual < 1.6
+
+
+def test_points_are_added_until_the_mean_is_as_sure_as_asked():
+    v, f = sphere(1.0, 2)
+    w = v * (1 + 0.1 * np.sin(4 * v[:, :1]))
+    sure = surface_distance(v, f, w, f, samples=400, relative=1e-3)
+    exact = surface_distance(v, f, w, f, samples=400_000)
+    assert sure.mean_error <= 1e-3 * sure.mean
+    assert sure.samples > 400
+    assert sure.mean == pytest.approx(exact.mean, rel=4e-3)
+    assert sure.rms == pytest.approx(exact.rms, rel=4 * sure.rms_error / sure.rms)
+    stopped = surface_distance(v, f, w, f, samples=400, relative=1e-9, max_samples=4000)
+    assert 400 < stopped.samples <= 4000
+    assert stopped.mean_error > 1e-9 * stopped.mean
+
+
+def test_a_pair_has_the_figures_of_its_parts():
+    v, f = sphere(1.0, 2)
+    w, g = sphere(1.1, 1)
+    pair = compare_surfaces(v, f, w, g, samples=4000)
+    assert pair.distance == surface_distance(v, f, w, g, samples=4000)
+    alone = hausdorff(v, f, w, g)
+    assert pair.hausdorff.lower <= alone.upper
+    assert alone.lower <= pair.hausdorff.upper
+    assert pair.distance.largest <= pair.hausdorff.lower
+    assert pair.hausdorff.upper <= pair.hausdorff.lower * 1.001 + 1e-12
+
+
+def test_vertices_alone_miss_the_quad():
+    assert vertex_hausdorff(QUAD, SPLIT_A, QUAD, SPLIT_B) == pytest.approx((0.0, 0.0), abs=1e-15)
+    v, f = sphere(1.0, 2)
+    w = v * [1, 1.1, 1]
+    assert max(vertex_hausdorff(v, f, w, f)) == pytest.approx(igl.hausdorff(v, f, w, f))
+
+
+def test_chamfer_by_its_four_names():
+    a = np.array([[0.0, 0, 0], [1, 0, 0]])
+    b = np.array([[0.0, 3, 0], [1, 0, 0], [1, 0, 4], [0, 0, 0]])
+    found = chamfer(a, b)  # from a: 0, 0; from b: 3, 0, 4, 0
+    assert (found.mean_ab, found.mean_ba, found.largest) == (0.0, 1.75, 4.0)
+    assert (found.sum_plain, found.mean_plain) == (1.75, 0.875)
+    assert (found.sum_squared, found.mean_squared) == (6.25, 3.125)
+
+
+def test_bad_points_and_counts_are_named():
+    v, f = sphere(1.0, 1)
+    with pytest.raises(InputError, match="second points: NaN or infinity in 1 points"):
+        chamfer(v, np.array([[0, 0, np.nan]]))
+    with pytest.raises(InputError, match="first points"):
+        chamfer(np.zeros((0, 3)), v)
+    for options in ({"samples": 3}, {"relative": 0.0}, {"max_samples": 0}):
+        with pytest.raises(InputError, match="8 samples or more"):
+            surface_distance(v, f, v, f, **options)
+    with pytest.raises(InputError, match="second mesh: NaN"):
+        surface_distance(v, f, v + np.nan, f)
