@@ -26,7 +26,7 @@ from muslin.eval.metrics.triangle_samples import TriangleSamples, triangle_sampl
 from muslin.eval.metrics.vertex import triangle_areas
 from muslin.eval.metrics.winding import cloth_winding_numbers
 
-SPACING = 5e-3  # metres
+SPACING = 1e-2  # metres
 CROSSED_SPLIT = 4
 DOUBTFUL_SPLIT = 16
 """Parts that an edge of a triangle is cut into for samples: where the body crosses it, and where its exact

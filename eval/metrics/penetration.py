@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from muslin.eval.metrics.triangle_pairs import triangle_boxes
 from muslin.eval.metrics.winding import winding_numbers
 from muslin.garments.errors import InputError
 
@@ -107,11 +108,15 @@ def nearest_distances(points: np.ndarray, vertices: np.ndarray, faces: np.ndarra
         return np.zeros(0)
     p = np.ascontiguousarray(points, dtype=np.float64)
     v = np.ascontiguousarray(vertices, dtype=np.float64)
-    used = np.unique(faces)
-    reach = float(cKDTree(v[used]).query(p)[0].max()) * (1.0 + 1e-9)
-    corners = v[faces]
-    near = (corners.min(axis=1) <= p.max(axis=0) + reach) & (corners.max(axis=1) >= p.min(axis=0) - reach)
-    kept = np.ascontiguousarray(faces[near.all(axis=1)], dtype=np.int64)
+    used = np.zeros(len(v), dtype=bool)
+    used[faces] = True
+    reach = float(cKDTree(v[used], balanced_tree=False, compact_nodes=False).query(p)[0].max()) * (1.0 + 1e-9)
+    low, high = triangle_boxes(v[faces])
+    near = np.ones(len(faces), dtype=bool)
+    for axis in range(3):
+        near &= low[:, axis] <= p[:, axis].max() + reach
+        near &= high[:, axis] >= p[:, axis].min() - reach
+    kept = np.ascontiguousarray(faces[near], dtype=np.int64)
     squared, _, _ = igl.point_mesh_squared_distance(p, v, kept)
     return np.sqrt(np.maximum(np.atleast_1d(squared), 0.0))
 

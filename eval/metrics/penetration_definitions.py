@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from muslin.eval.metrics.contact_input import check_triangles
-from muslin.eval.metrics.penetration import distances_to_body
+from muslin.eval.metrics.penetration import is_closed, pseudonormal_distances
 from muslin.eval.metrics.triangle_pairs import (
     TrianglePairs,
     intersecting_triangles,
@@ -18,6 +18,7 @@ from muslin.eval.metrics.triangle_pairs import (
     self_intersecting_triangles,
 )
 from muslin.eval.metrics.vertex import triangle_areas
+from muslin.eval.metrics.winding import cloth_winding_numbers
 from muslin.garments.errors import InputError
 
 HOOD_MARGIN = 1e-3  # metres
@@ -75,7 +76,7 @@ def penetration_definitions(
     own = self_intersecting_triangles(cloth, faces)
     swapped = TrianglePairs(own.faces[:, ::-1], own.coplanar)
     return PenetrationDefinitions(
-        signed_distance=float((distances_to_body(cloth, body, body_faces).values < 0.0).mean()),
+        signed_distance=_share_inside(cloth, faces, body, body_faces, pairs),
         nearest_vertex=float((distances_by_vertex_normal(cloth, body, body_faces) < 0.0).mean()),
         face_centre=float((distances_by_face_centre(cloth, body, body_faces) < 0.0).mean()),
         sample_angle=share_by_sample_angle(cloth, faces, body, body_faces, samples, seed),
@@ -134,6 +135,15 @@ def share_by_sample_angle(
     _, nearest = cKDTree(targets).query(points)
     normals = _face_normals(body, body_faces[face[nearest]])
     return float((np.einsum("ij,ij->i", points - targets[nearest], normals) < 0.0).mean())
+
+
+def _share_inside(
+    cloth: np.ndarray, faces: np.ndarray, body: np.ndarray, body_faces: np.ndarray, pairs: TrianglePairs
+) -> float:
+    """Share of vertices with a negative distance to the body, by the sign alone."""
+    if is_closed(body_faces):
+        return float((cloth_winding_numbers(cloth, faces, body, body_faces, pairs) > 0).mean())
+    return float((pseudonormal_distances(cloth, body, body_faces) < 0.0).mean())
 
 
 def _random_samples(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from muslin.eval.metrics.box_pairs import BoxTree, box_tree, overlapping, overlapping_within
+from muslin.eval.metrics.box_pairs import box_tree, overlapping, overlapping_within
 from muslin.eval.metrics.rational_triangles import APART, COPLANAR, triangles_meet
 
 ROUNDING = 16.0 * 2.0**-53
@@ -48,10 +48,12 @@ def intersecting_triangles(
     a, b = _corners(vertices_a, faces_a), _corners(vertices_b, faces_b)
     if not len(a) or not len(b):
         return _exactly(a, b, np.zeros((0, 2), dtype=np.int64))
-    of_a, of_b = _near(a, b), _near(b, a)
+    boxes_a, boxes_b = triangle_boxes(a), triangle_boxes(b)
+    of_a, of_b = _near(boxes_a, boxes_b), _near(boxes_b, boxes_a)
     if not len(of_a) or not len(of_b):
         return _exactly(a, b, np.zeros((0, 2), dtype=np.int64))
-    pairs = overlapping(_tree(a[of_a]), _tree(b[of_b]))
+    trees = [box_tree(low[near], high[near]) for (low, high), near in ((boxes_a, of_a), (boxes_b, of_b))]
+    pairs = overlapping(*trees)
     return _exactly(a, b, np.stack([of_a[pairs[:, 0]], of_b[pairs[:, 1]]], axis=1))
 
 
@@ -67,7 +69,7 @@ def self_intersecting_triangles(vertices: np.ndarray, faces: np.ndarray) -> Tria
     corners = _corners(vertices, faces)
     if len(corners) < 2:
         return _exactly(corners, corners, np.zeros((0, 2), dtype=np.int64))
-    pairs = overlapping_within(_tree(corners))
+    pairs = overlapping_within(box_tree(*triangle_boxes(corners)))
     ids = _same_positions(np.asarray(vertices, dtype=np.float64))[np.asarray(faces)]
     i, j = ids[pairs[:, 0]], ids[pairs[:, 1]]
     shared = np.zeros(len(pairs), dtype=bool)
@@ -124,17 +126,12 @@ def _corners(vertices: np.ndarray, faces: np.ndarray) -> NDArray[np.float64]:
     return np.asarray(vertices, dtype=np.float64)[np.asarray(faces).reshape(-1, 3)]
 
 
-def _tree(corners: np.ndarray) -> BoxTree:
-    return box_tree(*triangle_boxes(corners))
-
-
-def _near(corners: np.ndarray, others: np.ndarray) -> NDArray[np.int64]:
-    """The triangles whose box meets the box around all the others."""
-    low, high = others.reshape(-1, 3).min(axis=0), others.reshape(-1, 3).max(axis=0)
-    least, greatest = triangle_boxes(corners)
-    meets = np.ones(len(corners), dtype=bool)
+def _near(boxes: tuple[np.ndarray, np.ndarray], others: tuple[np.ndarray, np.ndarray]) -> NDArray[np.int64]:
+    """The boxes that meet the box around all the others."""
+    meets = np.ones(len(boxes[0]), dtype=bool)
     for axis in range(3):
-        meets &= (least[:, axis] <= high[axis]) & (greatest[:, axis] >= low[axis])
+        low, high = others[0][:, axis].min(), others[1][:, axis].max()
+        meets &= (boxes[0][:, axis] <= high) & (boxes[1][:, axis] >= low)
     return np.flatnonzero(meets)
 
 
