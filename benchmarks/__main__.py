@@ -114,6 +114,21 @@ def transfer(
 
 
 @app.command()
+def wrinkles(
+    source: Annotated[Path, typer.Argument(help="A dataset; the last frame of its first sample is taken.")],
+    out: Out = OUT / "wrinkles",
+) -> None:
+    """What metrics of shape say of a drape that is smoothed, and what they cost; write wrinkles.md."""
+    from benchmarks.wrinkles import Drape, cost_table, table
+
+    drape = Drape(source)
+    text = f"{len(drape.truth)} vertices\n\n{table(drape.rows())}\n\n{cost_table(drape.costs())}\n"
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "wrinkles.md").write_text(text, encoding="utf-8")
+    typer.echo(text)
+
+
+@app.command()
 def reach(
     out: Out = OUT / "reach",
     presets: Annotated[str, typer.Option(help="Presets of the tee.")] = (
