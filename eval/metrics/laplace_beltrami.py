@@ -19,6 +19,8 @@ from muslin.garments.half_edges import half_edges, on_boundary
 SLICE = 60  # eigenpairs that are sought together; the Lanczos basis of twice as many is what costs
 DENSE = 700  # vertices up to which a dense solver is faster
 START = 0  # seed of the Lanczos vectors
+ATTEMPTS = 3  # at cutting the spectrum, before the dense solver
+MOST = 3000  # eigenfunctions; more are asked for by a wrong unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,7 @@ def harmonic_basis(faces: np.ndarray, rest: np.ndarray, shortest: float = 0.1) -
         K_ij = -1/2 (cot a_ij + cot b_ij),   M_ii = 1/3 sum of the areas of the triangles at i
 
     with natural boundary conditions. By Weyl's law there are about pi A / shortest^2 functions on an area A:
-    300 to 400 on a t-shirt for 0.1 m.
+    250 on a t-shirt for 0.1 m.
 
     faces      (F, 3), sewn
     rest       corners of each face at rest, (F, 3, 2) in panel space, or (F, 3, 3), metres; so the metric is
@@ -109,8 +111,8 @@ def harmonic_basis(faces: np.ndarray, rest: np.ndarray, shortest: float = 0.1) -
     Eigenvalues are counted by the signs of the pivots of K - s M (Sylvester), and found by shifted and
     inverted Lanczos iterations in slices of about SLICE; so none is missed.
 
-    Raises InputError for faces and corners that do not match, are not finite or have no area, and for
-    vertices without a face.
+    Raises InputError for faces and corners that do not match, are not finite or have no area, for vertices
+    without a face, and for more than MOST functions.
 
     Sources: Pinkall, Polthier 1993 (cotangents); Vallet, Levy 2008 (manifold harmonics, band by band).
     """
@@ -147,21 +149,36 @@ def _below(matrix: csc_array, limit: float) -> tuple[np.ndarray, np.ndarray]:
     n = matrix.shape[0]
     if n > DENSE:
         total = _count(_factors(matrix, limit))
-        slices = -(-total // SLICE)
-        # Eigenvalues of a surface are spread evenly. The first slice reaches below 0 as far as needed.
-        edges = np.linspace(0.0, limit, slices + 1)
-        edges[0] = -0.5 * edges[1]
-        counts = [0, *(_count(_factors(matrix, edge)) for edge in edges[1:-1]), total]
-        parts = [
-            _slice(matrix, 0.5 * (low + high), b - a)
-            for low, high, a, b in zip(edges[:-1], edges[1:], counts[:-1], counts[1:], strict=True)
-            if b > a
-        ]
-        values = np.concatenate([part[0] for part in parts])
-        inside = np.searchsorted(np.sort(values), edges[1:])
-        if np.array_equal(inside, counts[1:]):
-            return values, np.hstack([part[1] for part in parts])
+        if total > MOST:
+            raise InputError(
+                f"harmonic basis: {total} waves as long as {2.0 * np.pi / np.sqrt(limit):.3g} m fit onto the "
+                f"cloth, {MOST} at most are allowed; check the unit, which is metres, or ask for longer ones"
+            )
+        for attempt in range(ATTEMPTS):
+            found = _by_slices(matrix, limit, total, -(-total // SLICE) + attempt)
+            if found is not None:
+                return found
     return eigh(matrix.toarray(), subset_by_value=(-np.inf, limit))
+
+
+def _by_slices(
+    matrix: csc_array, limit: float, total: int, slices: int
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The eigenpairs below the limit; None if those found are not as many as counted."""
+    # Eigenvalues of a surface are spread evenly. Below 0 there is none, but the first slice may lie there.
+    edges = np.linspace(0.0, limit, slices + 1)
+    edges[0] = -0.5 * edges[1]
+    counts = [0, *(_count(_factors(matrix, edge)) for edge in edges[1:-1]), total]
+    if (np.diff(counts) < 0).any():
+        return None
+    parts = [
+        _slice(matrix, 0.5 * (low + high), b - a)
+        for low, high, a, b in zip(edges[:-1], edges[1:], counts[:-1], counts[1:], strict=True)
+        if b > a
+    ]
+    values = np.concatenate([part[0] for part in parts])
+    inside = np.searchsorted(np.sort(values), edges[1:])
+    return (values, np.hstack([part[1] for part in parts])) if np.array_equal(inside, counts[1:]) else None
 
 
 def _slice(matrix: csc_array, shift: float, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -156,6 +156,10 @@ def test_basis_is_made_once_for_a_mesh_and_knows_its_pieces():
     assert band_energies(both, apart, (0.2,)).max() < 1e-12
 
 
+LARGE_UV, LARGE_FACES = sheet(60.0, 60.0, 60, 60)  # metres
+LARGE = LARGE_FACES, LARGE_UV[LARGE_FACES]
+
+
 @pytest.mark.parametrize(
     "call",
     [
@@ -165,6 +169,7 @@ def test_basis_is_made_once_for_a_mesh_and_knows_its_pieces():
         lambda: harmonic_basis(FACES[:0], UV[FACES][:0]),
         lambda: harmonic_basis(FACES + 1, UV[FACES], 0.2),
         lambda: harmonic_basis(FACES, UV[FACES], 0.0),
+        lambda: harmonic_basis(*LARGE),
         lambda: curvature_normals(BASIS, np.zeros((5, 3))),
         lambda: curvature_normals(BASIS, np.full((len(UV), 3), np.inf)),
         lambda: band_energies(BASIS, lifted(UV), (0.1, 0.2)),
