@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +155,8 @@ class Drape:
 
 def table(rows: list[Row]) -> str:
     """Markdown."""
-    bands = (*(f"> {1e3 * edge:g}" for edge in PANEL_BAND_EDGES), f"< {1e3 * PANEL_BAND_EDGES[-1]:g}")
+    edges = [f"{1e3 * edge:g}" for edge in PANEL_BAND_EDGES]
+    bands = [f"> {edges[0]}", *(f"{short} to {long}" for long, short in pairwise(edges)), f"< {edges[-1]}"]
     head = ["smoothing mm^2", "vertex mm", "normal °", "dihedral °", "curvature 1/m", "kept < 100 mm"]
     head += [f"kept {band} mm" for band in bands] + ["dB", "strain p99", "energy mJ"]
     lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]

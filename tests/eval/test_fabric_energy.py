@@ -11,10 +11,15 @@ import pytest
 import warp as wp
 
 from muslin.eval.fabric_energy import Energy, FabricEnergy
+from muslin.eval.metrics.checks import corner_areas
+from muslin.eval.metrics.dihedral import dihedral_angles, hinges
+from muslin.eval.metrics.strain import green_strain
 from muslin.eval.validate.meshes import rectangle
 from muslin.garments.errors import InputError
 from muslin.garments.merge import merge_meshes
 from muslin.sim.cloth import build_cloth
+from muslin.sim.elastic import ElasticEnergy
+from muslin.sim.energies.bending import bend_angle
 from muslin.sim.material import isotropic_fabric, load_fabric
 from muslin.sim.scene import parse_scene
 from muslin.sim.solve.settings import SolverSettings
@@ -73,6 +78,29 @@ def test_elastic_energy_is_the_simulators_own_and_its_force_the_slope():
     h = 1e-7
     difference = (ask.energy(x + h * way).total - ask.energy(x - h * way).total) / (2 * h)
     assert difference == pytest.approx((slope * way).sum(), rel=1e-6)
+
+
+def test_metrics_of_strain_and_folds_are_what_the_simulator_takes():
+    x = rolled(0.15) + 1e-3 * np.random.default_rng(2).normal(size=FLAT.shape)
+    panels = MESH.panel_vertices[MESH.panel_faces]
+    strain, (c11, c12, c22, c33) = green_strain(x, MESH.faces, panels), PLATE.stretch_rest
+    density = c11 * strain.warp**2 + c22 * strain.weft**2
+    density += 2.0 * c12 * strain.warp * strain.weft + c33 * strain.shear**2
+    assert FabricEnergy(MESH, PLATE).energy(x).stretch == pytest.approx(corner_areas(panels) @ density)
+
+    cloth = build_cloth(MESH, PLATE)
+    elastic = ElasticEnergy(cloth, "cpu")
+    inputs = [wp.array(x, dtype=wp.vec3d), elastic.bend, elastic.bend_state]
+    wp.launch(bend_angle, len(cloth.hinges), inputs)
+    edges = hinges(MESH.faces)
+    simulated, measured = (
+        dict(zip(map(frozenset, ends[:, :2].tolist()), angles, strict=True))
+        for ends, angles in (
+            (cloth.hinges, elastic.bend_state.angle.numpy()),
+            (edges, dihedral_angles(x, edges)),
+        )
+    )
+    assert measured == pytest.approx(simulated, abs=1e-12)
 
 
 def test_drape_at_rest_has_less_energy_than_anything_near_it():
