@@ -30,8 +30,8 @@ class Orbit {
   }
 
   // right and up in units of the picture's height
-  shift(right, up, reach) {
-    const height = (2.2 * reach) / this.zoom;
+  shift(right, up) {
+    const height = this.height;
     const sine = Math.sin(this.elevation), cosine = Math.cos(this.elevation);
     const [x, z] = [Math.sin(this.azimuth), Math.cos(this.azimuth)];
     this.pan.add(new THREE.Vector3(z, 0, -x).multiplyScalar(-right * height));
@@ -43,6 +43,7 @@ class Orbit {
   view(centre, half, radius, aspect, floor) {
     const slope = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
     const distance = ((1.08 * Math.max(half, radius / aspect)) / slope + radius) / this.zoom;
+    this.height = 2 * slope * distance; // metres that the picture shows where the target is
     const target = centre.clone().add(this.pan);
     const level = Math.cos(this.elevation);
     const away = new THREE.Vector3(
@@ -53,7 +54,7 @@ class Orbit {
 
   // Listens to a canvas. The wheel belongs to the page until the pane has the focus, and so does a finger that
   // moves up or down (touch-action: pan-y).
-  attach(canvas, reach, hint) {
+  attach(canvas, hint) {
     const pointers = new Map();
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", () => this.reset());
@@ -75,8 +76,8 @@ class Orbit {
       if (others.length) {
         const apart = (one) => Math.hypot(one.clientX - others[0].clientX, one.clientY - others[0].clientY) || 1;
         this.scale(apart(event) / apart(last));
-        this.shift(x / 2, -y / 2, reach());
-      } else if (event.shiftKey || last.buttons & 6) this.shift(x, -y, reach());
+        this.shift(x / 2, -y / 2); // the other finger does the other half
+      } else if (event.shiftKey || last.buttons & 6) this.shift(x, -y);
       else this.turn(3.2 * x, 3.2 * y);
     });
     canvas.addEventListener(

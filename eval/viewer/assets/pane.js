@@ -11,7 +11,7 @@ class Pane {
     this.root = element("div", { class: "mv-pane" },
       element("div", { class: "mv-name" }, dot, element("b", {}, name), this.figure),
       element("div", { class: "mv-picture" }, this.canvas, this.probe, this.hint));
-    player.orbit.attach(this.canvas, () => player.reach, () => this.remind());
+    player.orbit.attach(this.canvas, () => this.remind());
     this.canvas.addEventListener("pointermove", (event) => {
       if (event.pointerType === "mouse") player.point(event.offsetX / this.canvas.clientWidth, event.offsetY / this.canvas.clientHeight);
     });

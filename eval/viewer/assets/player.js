@@ -1,5 +1,6 @@
 // A viewer: panes side by side, what plays them, and what can be set.
 
+const MOUSE = "Drag turns, with shift it moves, double click resets; space plays, arrows step.";
 const KEYS = "space plays, arrows step, home and end; with shift arrows turn, + and - zoom, 0 resets the view";
 
 class Player {
@@ -15,7 +16,7 @@ class Player {
 
   build() {
     const names = this.data.scenes.map((scene, i) => [i, scene.name]);
-    const chooser = names.length > 1
+    this.chooser = names.length > 1
       ? select("scene", names, 0, (index) => (this.ready = this.open(Number(index))))
       : element("b", { class: "mv-title" }, names[0][1]);
     const set = (name) => (value) => {
@@ -47,7 +48,7 @@ class Player {
     this.plot = new Plot((frame) => this.seek(frame / this.scene.stride));
     this.note = element("p", { class: "mv-note" });
     this.root.append(
-      element("div", { class: "mv-top" }, chooser, this.heat, lines, this.bodyToggle, this.followToggle, reset),
+      element("div", { class: "mv-top" }, this.chooser, this.heat, lines, this.bodyToggle, this.followToggle, reset),
       this.grid, this.bar.root, this.timeline, this.plot.svg, this.note);
     this.root.setAttribute("role", "group");
     this.root.setAttribute("aria-label", `frames side by side; ${KEYS}`);
@@ -58,14 +59,17 @@ class Player {
 
   async open(index) {
     this.pause();
+    const turn = (this.turn = (this.turn ?? 0) + 1);
     const scene = this.data.scenes[index];
     this.root.setAttribute("aria-busy", "true");
     const tracks = await Promise.all(scene.sides.map((side) => Track.open(side.mesh)));
     const body = scene.body && (await Track.open(scene.body));
+    if (turn !== this.turn) return; // another scene was chosen meanwhile
     for (const old of [...this.panes.map((pane) => pane.surface), this.body]) old?.dispose();
     Object.assign(this, { scene, tracks, frame: 0, high: scene.high });
     this.body = body && new Surface(body);
     this.frames = tracks[0].length;
+    this.chooser.value = index;
     this.survey(tracks[0], body);
     this.fill(scene, tracks);
     this.orbit.home = scene.azimuth;
@@ -102,7 +106,6 @@ class Player {
       return pane;
     });
     this.grid.replaceChildren(...this.panes.map((pane) => pane.root));
-    this.grid.style.setProperty("--panes", this.panes.length);
     if (!this.stage)
       this.grid.replaceChildren(element("p", { class: "mv-missing", role: "alert" },
         "The frames cannot be drawn: this browser gives the page no WebGL. Another browser, or its hardware acceleration switched on, shows them."));
@@ -116,13 +119,9 @@ class Player {
     if (lines.length) this.plot.open(lines, scene.unit, scene.fps);
     this.bar.show(this.high, scene.unit);
     const error = 500 * Math.max(...tracks.map((track) => track.step));
-    const kept = scene.stride > 1 ? `Of ${scene.frames} frames every ${scene.stride}. is in this page (the plot has all). ` : "";
-    this.note.textContent = `${kept}Positions are within ${error.toPrecision(2)} mm of the data.`;
+    const kept = scene.stride > 1 ? `One frame in ${scene.stride} of ${scene.frames} is in this page; the plot has all. ` : "";
+    this.note.textContent = `${kept}Positions are within ${error.toPrecision(2)} mm of the data. ${MOUSE}`;
     this.note.title = KEYS;
-  }
-
-  get reach() {
-    return this.half;
   }
 
   view(aspect) {

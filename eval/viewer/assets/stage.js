@@ -28,7 +28,7 @@ class Stage {
     this.fill = new THREE.DirectionalLight(0xdde8ff, 0.6);
     this.key.castShadow = true;
     this.key.shadow.mapSize.set(1024, 1024);
-    this.key.shadow.radius = 6;
+    this.key.shadow.radius = 3;
     this.floor = new THREE.Mesh(new THREE.CircleGeometry(1, 64), new THREE.ShadowMaterial({ opacity: 0.22 }));
     this.floor.rotation.x = -Math.PI / 2;
     this.floor.receiveShadow = true;
@@ -75,7 +75,7 @@ class Stage {
     const at = (forward, right, up) =>
       target.clone().addScaledVector(side, forward * reach).addScaledVector(across, right * reach)
         .add(new THREE.Vector3(0, up * reach, 0));
-    this.key.position.copy(at(2, -2.1, 3.4));
+    this.key.position.copy(at(2.7, -1.9, 2.5));
     this.fill.position.copy(at(1.5, 3, 0.8));
     this.key.target.position.copy(target);
     this.fill.target.position.copy(target);
@@ -87,8 +87,8 @@ class Stage {
       box.near = 0.2 * reach;
       box.far = 9 * reach;
       box.updateProjectionMatrix();
-      shadow.normalBias = 0.006 * reach;
-      shadow.bias = -0.0004;
+      shadow.normalBias = 0.012 * reach;
+      shadow.bias = -0.0006;
     }
     this.floor.visible = view.floor !== null;
     this.floor.position.set(target.x, view.floor ?? 0, target.z);

@@ -18,7 +18,9 @@ window.muslinViewers.start = () => {
     root.dataset.started = "";
     const index = window.muslinViewers.push(null) - 1;
     root.muslinStart = () => {
-      const data = JSON.parse(root.querySelector("script").textContent);
+      const script = root.querySelector("script");
+      const data = JSON.parse(script.textContent);
+      script.remove();
       const player = (window.muslinViewers[index] = new Player(root, data));
       player.ready.catch((error) => {
         root.append(element("p", { class: "mv-missing", role: "alert" }, `The frames cannot be unpacked: ${error.message}`));

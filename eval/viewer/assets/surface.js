@@ -61,8 +61,8 @@ function materials(stops) {
   const map = heatTexture(stops);
   return {
     cloth: new THREE.MeshLambertMaterial({ ...common, color: CLOTH }),
-    // Half of its light is its own, so that a fold's shade does not pass for another colour of the bar.
-    heat: new THREE.MeshLambertMaterial({ ...common, color: 0x8a8a8a, map, emissive: 0xa0a0a0, emissiveMap: map }),
+    // More than half of its light is its own, so that a fold's shade does not pass for another colour of the bar.
+    heat: new THREE.MeshLambertMaterial({ ...common, color: 0xb0b0b0, map, emissive: 0xc2c2c2, emissiveMap: map }),
     body: new THREE.MeshLambertMaterial({ color: BODY, polygonOffset: true, polygonOffsetFactor: 2,
       polygonOffsetUnits: 2 }),
     lines: new THREE.LineBasicMaterial({ color: LINES, transparent: true, opacity: 0.42 }),

@@ -40,6 +40,8 @@ PICTURE = """([viewer, pane]) => {
   }
   return [drawn / (canvas.width * canvas.height), hash];
 }"""
+# graphics in software take their time by the pixel
+SMALL = "<style>.mv-canvas { height: 130px !important }</style>"
 SETTLED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
 
 
@@ -47,7 +49,7 @@ def write_page(path: Path, *fragments: str) -> str:
     """A page with these fragments and much text below each; its address."""
     text = "".join(f"<p>line {i}</p>" for i in range(60))
     body = text.join(fragments) + text
-    path.write_text(f"<!doctype html><meta charset=utf-8><body>{body}", encoding="utf-8")
+    path.write_text(f"<!doctype html><meta charset=utf-8>{SMALL}<body>{body}", encoding="utf-8")
     return path.as_uri()
 
 
@@ -296,6 +298,42 @@ def test_panes_stack_in_a_narrow_window(page) -> None:
     assert second["y"] >= first["y"] + first["height"]
     assert picture(page, 1)[0] > 0.02
     assert page.evaluate("document.documentElement.scrollWidth") <= 380
+
+
+def test_two_fingers_zoom(page) -> None:
+    box = page.locator(".mv-canvas").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    session = page.context.new_cdp_session(page)
+
+    def touch(kind: str, *apart: float) -> None:
+        points = [{"x": x + side * apart[0], "y": y, "id": side} for side in (-1, 1)] if apart else []
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", 10)
+    touch("touchMove", 20)
+    touch("touchMove", 40)
+    touch("touchEnd")
+    assert page.evaluate("muslinViewers[0].orbit.zoom") > 1.5
+
+
+def test_the_last_choice_of_a_scene_counts(page) -> None:
+    page.evaluate("() => { const v = muslinViewers[0]; v.open(1); return (v.ready = v.open(2)); }")
+    page.wait_for_timeout(100)
+    assert page.evaluate("muslinViewers[0].scene.name") == "still"
+
+
+def test_thinned_frames_keep_their_numbers(chromium, scenes, tmp_path) -> None:
+    page = opened(chromium, write_page(tmp_path / "thin.html", viewer(scenes[:1], budget=2500)))
+    assert "One frame in 3 of 8 is in this page" in page.locator(".mv-note").text_content()
+    page.keyboard.press("Tab")
+    page.keyboard.press("End")
+    assert label(page) == "frame 6 / 7 · 0.24 s"
+    np.testing.assert_allclose(
+        page.evaluate("muslinViewers[0].positions(1, 2).then((a) => [...a.slice(0, 3)])"),
+        scenes[0].sides["first"].positions[6][0],
+        atol=5e-5,
+    )
+    page.close()
 
 
 def test_without_webgl_it_says_so(chromium, address) -> None:
