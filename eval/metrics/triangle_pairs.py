@@ -17,6 +17,9 @@ has 7 half-units in the last place for one order of operations; twice that and t
 NEXT = np.array([1, 2, 0])
 UNSURE = 2
 
+AT_A_TIME = 250_000
+"""Pairs decided together: some 500 bytes each."""
+
 
 @dataclass(frozen=True)
 class TrianglePairs:
@@ -145,7 +148,14 @@ def _same_positions(vertices: np.ndarray) -> NDArray[np.int64]:
 
 
 def _exactly(a: np.ndarray, b: np.ndarray, pairs: NDArray[np.int64]) -> TrianglePairs:
-    """Those of the pairs (K, 2) of triangles a[i], b[j] that intersect."""
+    """Those of the pairs (K, 2) of triangles a[i], b[j] that intersect; a part of them at a time."""
+    parts = [_part_exactly(a, b, pairs[at : at + AT_A_TIME]) for at in range(0, len(pairs) or 1, AT_A_TIME)]
+    return TrianglePairs(
+        np.concatenate([part.faces for part in parts]), np.concatenate([part.coplanar for part in parts])
+    )
+
+
+def _part_exactly(a: np.ndarray, b: np.ndarray, pairs: NDArray[np.int64]) -> TrianglePairs:
     above = _signs(a[pairs[:, 0]], b[pairs[:, 1]])
     open_ = abs(above.sum(axis=1)) < 3
     pairs, above = pairs[open_], above[open_]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from muslin.eval.metrics.accumulate import PenetrationAccumulator
 from muslin.eval.metrics.penetration import (
     PSEUDONORMAL,
     WINDING_NUMBER,
@@ -55,10 +54,6 @@ def test_ratio_and_depths():
     assert (found.ratio, found.depth_mean, found.depth_max) == pytest.approx((0.5, 0.2, 0.3))
     clear = penetration(np.ones(3))
     assert (clear.ratio, clear.depth_mean, clear.depth_max) == (0, 0, 0)
-    accumulator = PenetrationAccumulator()
-    accumulator.update(np.array([0.5, -0.25]))
-    accumulator.update(np.array([-0.5, 0.25]))
-    assert accumulator.result() == penetration(np.array([0.5, -0.25, -0.5, 0.25]))
 
 
 def test_closedness():
