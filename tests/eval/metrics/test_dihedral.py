@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from muslin.eval.metrics.dihedral import dihedral_angles, dihedral_errors, edge_areas, hinges
 from muslin.eval.metrics.vertex import statistics
@@ -45,6 +46,16 @@ def test_angles_of_a_rough_sheet_against_the_slow_reference():
     expected = np.array([slow_angle(rough, edge) for edge in EDGES])
     assert dihedral_angles(rough, EDGES) == pytest.approx(expected, abs=1e-7)
     assert dihedral_angles(turned(rough), EDGES) == pytest.approx(dihedral_angles(rough, EDGES), abs=1e-11)
+
+
+def test_angles_and_their_signs_agree_with_trimesh():
+    rough = turned(rolled(UV, RADIUS) + 0.01 * np.random.default_rng(0).normal(size=(len(UV), 3)))
+    other = trimesh.Trimesh(rough, FACES, process=False)
+    signs = np.where(other.face_adjacency_convex, 1.0, -1.0) * other.face_adjacency_angles
+    theirs = dict(zip(map(frozenset, other.face_adjacency_edges.tolist()), signs, strict=True))
+    angles = dihedral_angles(rough, EDGES)
+    ours = dict(zip(map(frozenset, EDGES[:, :2].tolist()), angles, strict=True))
+    assert ours == pytest.approx(theirs, abs=1e-7)
 
 
 def test_sphere_is_convex_and_its_folds_add_up_to_its_total_mean_curvature():
