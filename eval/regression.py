@@ -20,7 +20,9 @@ ROUNDING = 1e-6
 """Allowed beside the tolerance, in the figure's unit: what other machines round differently."""
 
 ERRORS = re.compile(r"error|distance|hausdorff|penetration|intersection|inside|depth|contour")
-"""Found in the names of figures of which less is better. `truth_…` figures are never among them."""
+"""Found in the paths of figures of which less is better,"""
+NO_ERRORS = re.compile(r"(^|\.)truth|uncertain|coplanar")
+"""unless this is found too: figures of the truth alone, and of how sure others are."""
 NOT_FIGURES = {"prediction", "truth", "samples", "frames", "notes", "unmatched", "pairs", "origin"}
 
 
@@ -117,9 +119,8 @@ def regressions(baseline: Measured, now: Measured, tolerances: Tolerances | None
 
 
 def is_error(figure: str) -> bool:
-    """Whether less of a figure is better, by its name."""
-    root = figure.split(".")[0]
-    return not root.startswith("truth_") and ERRORS.search(root) is not None
+    """Whether less of a figure is better, by its path."""
+    return ERRORS.search(figure) is not None and NO_ERRORS.search(figure) is None
 
 
 def parse_tolerances(given: Sequence[str]) -> Tolerances:

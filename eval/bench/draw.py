@@ -64,6 +64,7 @@ def _figure(plot: Plot) -> Figure:
     axes.grid(alpha=0.15, color=INK)
     if plot.categories is not None:
         axes.set_xticks(range(len(plot.categories)), plot.categories, fontsize=8, rotation=20, ha="right")
+        axes.set_xlim(-0.5, len(plot.categories) - 0.5)
     if len(plot.curves) > 1:
         axes.legend(fontsize=8)
     return figure

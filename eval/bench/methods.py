@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from muslin.eval.cost import Cost, read_cost
 from muslin.eval.read.subject import open_subject
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
@@ -21,12 +22,14 @@ class Method:
 
     predictions   {id of the truth's sample: where its prediction lies}; without those that are missing
     is_dataset    whether predictions are samples, which know their frame rate
+    cost          what the predictions cost, if the folder says so (`muslin.eval.cost`)
     """
 
     name: str
     path: Path
     predictions: dict[str, Path]
     is_dataset: bool
+    cost: Cost | None = None
 
 
 def parse_methods(given: Sequence[str]) -> dict[str, Path]:
@@ -64,7 +67,7 @@ def open_method(name: str, path: Path, truth: Path, ids: Sequence[str]) -> Metho
             f"{where}: predicts none of the {len(ids)} samples that are scored ({', '.join(ids[:3])} …); "
             "predictions carry the ids of the truth's samples"
         )
-    return Method(name, path, found, is_dataset)
+    return Method(name, path, found, is_dataset, read_cost(path))
 
 
 def _of_dataset(path: Path, truth: Path, ids: Sequence[str]) -> dict[str, Path]:

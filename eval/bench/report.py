@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,9 +10,10 @@ from muslin.eval.bench.curves import plots
 from muslin.eval.bench.draw import plot_svg
 from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.scenes import scenes
-from muslin.eval.bench.tables import Filled, duels, fill
+from muslin.eval.bench.tables import BLANK, Filled, duels, fill
 from muslin.eval.bench.write import DUEL_HEADS, cell_text, duel_row
-from muslin.eval.page import column, duration, render_page, tile
+from muslin.eval.cost import Cost
+from muslin.eval.page import column, duration, number, render_page, tile
 from muslin.eval.viewer.page import viewer
 
 NAMED = 12  # most samples that a note names
@@ -35,7 +37,7 @@ def bench_report(outcome: Outcome) -> str:
             tile("computing time", duration(outcome.seconds)),
         ],
         notes=_notes(outcome),
-        method_columns=[column("method", text=True), column("folder", text=True), *_counts()],
+        method_columns=_method_columns(outcome),
         method_rows=[_method_row(outcome, name) for name in outcome.methods],
         tables=[_table(fill(outcome, table)) for table in protocol.tables],
         interval=f"{100 * protocol.bootstrap.confidence:g}%",
@@ -47,14 +49,27 @@ def bench_report(outcome: Outcome) -> str:
     )
 
 
-def _counts() -> list[dict[str, Any]]:
-    return [column("scored"), column("missing"), column("refused")]
+def _costs(outcome: Outcome) -> bool:
+    return any(method.cost is not None for method in outcome.methods.values())
+
+
+def _method_columns(outcome: Outcome) -> list[dict[str, Any]]:
+    columns = [column("method", text=True), column("folder", text=True)]
+    columns += [column(name) for name in ("scored", "missing", "refused")]
+    costs = ("ms a frame", "parameters", "model, MB", "on") if _costs(outcome) else ()
+    return columns + [column(name, text=name == "on") for name in costs]
 
 
 def _method_row(outcome: Outcome, name: str) -> list[str]:
-    missing, refused = outcome.missing(name), outcome.refused(name)
+    method, missing, refused = outcome.methods[name], outcome.missing(name), outcome.refused(name)
     scored = len(outcome.entries) - len(missing) - len(refused)
-    return [name, str(outcome.methods[name].path), str(scored), str(len(missing)), str(len(refused))]
+    row = [name, str(method.path), str(scored), str(len(missing)), str(len(refused))]
+    if not _costs(outcome):
+        return row
+    cost = method.cost or Cost()
+    megabytes = None if cost.file_bytes is None else cost.file_bytes / 1e6
+    parameters = BLANK if cost.parameters is None else f"{cost.parameters:,}"
+    return [*row, number(cost.milliseconds_per_frame), parameters, number(megabytes), cost.device or BLANK]
 
 
 def _notes(outcome: Outcome) -> list[str]:
@@ -66,8 +81,9 @@ def _notes(outcome: Outcome) -> list[str]:
             notes.append(f"{name}, {sample}: not scored: {reason}")
     if notes:
         notes.append("every mean and comparison is over the samples that all methods have a score of")
-    said = {note for score in outcome.scores.values() for note in score.notes}
-    return notes + sorted(said)
+    said = Counter(note for score in outcome.scores.values() for note in score.notes)
+    of = len(outcome.scores)
+    return notes + [note if n == of else f"{note} ({n} of {of} predictions)" for note, n in said.items()]
 
 
 def _some(ids: Sequence[str]) -> str:

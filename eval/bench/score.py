@@ -99,7 +99,7 @@ def figure_value(figures: dict[str, Any], path: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise _unknown(figures, path)
     if not math.isfinite(value):
-        raise InputError(f"figure {path!r} is {value}: a prediction or its truth has to be corrected")
+        raise InputError(f"figure {path!r} is {value}; correct the prediction, or its truth")
     return float(value)
 
 
@@ -115,9 +115,12 @@ def figure_paths(figures: dict[str, Any], prefix: str = "") -> list[str]:
 
 
 def check_figures(paths: Iterable[str], score: Score) -> None:
-    """Raise InputError if a path is of no figure."""
+    """Raise InputError if a path is of no figure, or a figure is not finite."""
     for path in paths:
-        figure_value(score.figures, path)
+        try:
+            figure_value(score.figures, path)
+        except InputError as error:
+            raise InputError(f"{score.method}, {score.sample}: {error}") from error
 
 
 def _unknown(figures: dict[str, Any], path: str) -> InputError:

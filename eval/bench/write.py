@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -66,11 +67,13 @@ def results_json(
 
 
 def _method(outcome: Outcome, name: str) -> dict[str, Any]:
+    method = outcome.methods[name]
     return {
-        "path": str(outcome.methods[name].path),
+        "path": str(method.path),
         "scored": sum(outcome.score(name, i) is not None for i in outcome.entries),
         "missing": outcome.missing(name),
         "refused": outcome.refused(name),
+        "cost": None if method.cost is None else asdict(method.cost),
     }
 
 

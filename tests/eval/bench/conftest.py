@@ -9,6 +9,7 @@ import pytest
 from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.protocol import load_protocol
 from muslin.eval.bench.run import bench
+from muslin.eval.cost import Cost, write_cost
 from tests.eval.bench.data import predict, predict_files, write_truth
 
 PROTOCOLS = Path(__file__).resolve().parents[3] / "scenes" / "protocols"
@@ -36,6 +37,7 @@ def methods(truth) -> dict[str, Path]:
         lambda s, t: 2e-3 * (-1) ** t * DESIGN_MM[s.labels["design"]],
         leave_out=(LEFT_OUT,),
     )
+    write_cost(Cost(milliseconds_per_frame=12.5, parameters=7_100_000, file_bytes=14_200_000), shaky)
     return {"steady": steady, "shaky": shaky}
 
 

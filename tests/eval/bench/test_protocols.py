@@ -156,6 +156,8 @@ def test_page_shows_everything_and_needs_nothing(outcomes):
     page = bench_report(outcomes[DESIGNS])
     assert "shaky lacks 1 samples: c-s2-t0" in page
     assert "2 of 3" in page
+    for cost in ("12.5", "7,100,000", "14.2"):
+        assert f'<td class="">{cost}</td>' in page
     assert page.count("<svg") == 3
     assert 'class="muslin-viewer"' in page
     for what in ("worst", "median", "best"):
