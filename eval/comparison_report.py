@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from muslin.eval.compare import Comparison, PairScore
 from muslin.eval.metrics.surface_sampling import point_to_surface
 from muslin.eval.page import column, number, picture_source, render_page, tile
 from muslin.eval.plots import Line, line_plot
-from muslin.eval.read.pairing import paired
+from muslin.eval.read.pairing import Pair, paired
 from muslin.eval.read.track import Track
+from muslin.eval.side_by_side import side_by_side
+from muslin.eval.viewer.page import viewer
 from muslin.sim.view.camera import frame_camera
 from muslin.sim.view.heatmap import colours, with_bar
 from muslin.sim.view.layer import OBSTACLE, SKIN, Layer
@@ -22,11 +26,80 @@ from muslin.sim.view.render import render
 
 HEAT_MAPS = 3
 HEAT_SIZE = (390, 520)
-FIGURES = ("mean", "rms", "median", "p95", "max")
+SHOWN = 6_000_000  # vertices times frames in the player: some 20 MB of page
+STATISTICS = ("mean", "rms", "median", "p95", "max")
+DISTRIBUTIONS = {
+    "vertex_error_mm": ("vertex error, mm", 1.0),
+    "vertex_error_area_weighted_mm": ("vertex error by area, mm", 1.0),
+    "velocity_error_mm_s": ("velocity error, mm/s", 1.0),
+    "acceleration_error_m_s2": ("acceleration error, m/s²", 1.0),
+    "jerk_error_m_s3": ("jerk error, m/s³", 1.0),
+    "normal_error_deg": ("angle of normals, °", 1.0),
+    "dihedral_error_deg": ("error of dihedral angles, °", 1.0),
+    "edge_length_error": ("error of edge lengths, %", 100.0),
+    "area_error": ("error of areas, %", 100.0),
+}
+"""Label and factor of the figures that have all of `STATISTICS`, by name."""
+BESIDE = (
+    ("jitter (mean jerk), m/s³", "jitter_m_s3.prediction", "jitter_m_s3.truth", 1.0),
+    ("mean curvature, rms, 1/m", "curvature_1_m.prediction_rms", "curvature_1_m.truth_rms", 1.0),
+    (
+        "largest strain, 99% of the area below, %",
+        "strain.prediction.major.p99",
+        "strain.truth.major.p99",
+        100.0,
+    ),
+    (
+        "smallest strain, 1% of the area below, %",
+        "strain.prediction.minor.p1",
+        "strain.truth.minor.p1",
+        100.0,
+    ),
+    ("vertices inside the body, %", "penetration.ratio", "truth_penetration.ratio", 100.0),
+    ("area inside the body, %", "penetration.area_ratio", "truth_penetration.area_ratio", 100.0),
+    (
+        "mean depth of vertices inside, mm",
+        "penetration.depth_mean_mm",
+        "truth_penetration.depth_mean_mm",
+        1.0,
+    ),
+    (
+        "largest depth, mm",
+        "penetration.surface_depth_max_mm",
+        "truth_penetration.surface_depth_max_mm",
+        1.0,
+    ),
+    (
+        "pairs of triangles crossing the body, a frame",
+        "body_intersections.pairs_mean",
+        "truth_body_intersections.pairs_mean",
+        1.0,
+    ),
+    (
+        "contour with the body, a frame, m",
+        "body_intersections.contour_mean_m",
+        "truth_body_intersections.contour_mean_m",
+        1.0,
+    ),
+    (
+        "pairs of triangles of the cloth crossing, a frame",
+        "self_intersections.pairs_mean",
+        "truth_self_intersections.pairs_mean",
+        1.0,
+    ),
+    (
+        "their contour, a frame, m",
+        "self_intersections.contour_mean_m",
+        "truth_self_intersections.contour_mean_m",
+        1.0,
+    ),
+    ("elastic and gravitational energy, J", "energy_j.prediction.total", "energy_j.truth.total", 1.0),
+)
+"""Label, prediction and truth as dotted paths, and factor of figures that both sides have by themselves."""
 
 
 def comparison_report(comparison: Comparison) -> str:
-    """HTML of a comparison: figures, plots over frames and over beta, heat maps of the worst pairs."""
+    """HTML of a comparison: figures, plots over frames and over beta, the worst pairs seen and played."""
     figures = comparison.figures
     return render_page(
         "comparison.html.j2",
@@ -35,10 +108,15 @@ def comparison_report(comparison: Comparison) -> str:
         truth=comparison.truth,
         tiles=_tiles(comparison),
         notes=comparison.notes + _unmatched(comparison),
-        columns=[column("figure", text=True), *(column(name) for name in FIGURES)],
+        columns=[column("figure", text=True), *(column(name) for name in STATISTICS)],
         rows=_rows(figures),
+        both_columns=[column("figure", text=True), column("prediction"), column("truth")],
+        both_rows=_both_rows(figures),
+        band_columns=[column(name) for name in ("wavelength, m", "prediction, 1/m", "truth, 1/m", "kept, %")],
+        band_rows=_band_rows(figures),
         plots=_frame_plots(comparison.pairs) + _beta_plots(comparison.pairs),
         heat_maps=_heat_maps(comparison),
+        viewer=_viewer(comparison),
         pair_columns=[
             column("sample", text=True),
             column("design", text=True),
@@ -49,24 +127,36 @@ def comparison_report(comparison: Comparison) -> str:
             column("velocity, mm/s"),
             column("surface mean, mm"),
             column("Hausdorff, mm"),
+            column("wrinkles kept, %"),
             column("inside, %"),
+            column("pairs crossing"),
         ],
         pair_rows=[_pair_row(pair) for pair in comparison.pairs],
     )
 
 
+def figure(figures: Any, path: str, factor: float = 1.0) -> float | None:
+    """A figure by its dotted path, times a factor; None where there is none."""
+    for name in path.split("."):
+        figures = None if figures is None else figures.get(name)
+    return None if figures is None else factor * figures
+
+
 def _tiles(comparison: Comparison) -> list[dict[str, str]]:
-    figures = comparison.figures
     tiles = [tile("samples", str(len(comparison.pairs))), tile("frames", str(comparison.frames))]
-    if figures["vertex_error_mm"] is not None:
-        tiles.append(tile("mean vertex error", f"{number(figures['vertex_error_mm']['mean'])} mm"))
-    if figures["velocity_error_mm_s"] is not None:
-        tiles.append(tile("mean velocity error", f"{number(figures['velocity_error_mm_s']['mean'])} mm/s"))
-    tiles.append(tile("mean surface distance", f"{number(figures['mean_surface_distance_mm'])} mm"))
-    tiles.append(tile("Hausdorff distance, worst frame", f"{number(figures['hausdorff_mm'])} mm"))
-    if figures["penetration"] is not None:
-        ratio = figures["penetration"]["ratio"]
-        tiles.append(tile("vertices inside the body", f"{number(100 * ratio)} %", "bad" if ratio else "good"))
+    for label, path, unit, factor in (
+        ("mean vertex error", "vertex_error_mm.mean", "mm", 1.0),
+        ("mean velocity error", "velocity_error_mm_s.mean", "mm/s", 1.0),
+        ("mean surface distance", "mean_surface_distance_mm", "mm", 1.0),
+        ("Hausdorff distance, worst frame", "hausdorff_mm", "mm", 1.0),
+        ("of wrinkles kept", "spectrum.wrinkles_kept", "%", 100.0),
+    ):
+        value = figure(comparison.figures, path, factor)
+        if value is not None:
+            tiles.append(tile(label, f"{number(value)} {unit}"))
+    inside = figure(comparison.figures, "penetration.ratio", 100.0)
+    if inside is not None:
+        tiles.append(tile("vertices inside the body", f"{number(inside)} %", "bad" if inside else "good"))
     return tiles
 
 
@@ -77,33 +167,35 @@ def _unmatched(comparison: Comparison) -> list[str]:
 
 def _rows(figures: dict[str, Any]) -> list[list[str]]:
     rows = []
-    for label, key in (
-        ("vertex error, mm", "vertex_error_mm"),
-        ("vertex error by area, mm", "vertex_error_area_weighted_mm"),
-        ("velocity error, mm/s", "velocity_error_mm_s"),
-    ):
-        values = figures[key] or dict.fromkeys(FIGURES)
-        rows.append([label, *(number(values[name]) for name in FIGURES)])
-    blank = "–"
-    rows.append(
-        [
-            "surface distance, mm",
-            number(figures["mean_surface_distance_mm"]),
-            number(figures["rms_surface_distance_mm"]),
-            blank,
-            blank,
-            f"{number(figures['hausdorff_mm'])} (at most {number(figures['hausdorff_upper_mm'])})",
-        ]
-    )
-    for label, key in (
-        ("depth inside the body, mm", "penetration"),
-        ("the truth's own depth, mm", "truth_penetration"),
-    ):
-        values = figures[key] or {"depth_mean_mm": None, "depth_max_mm": None}
-        rows.append(
-            [label, number(values["depth_mean_mm"]), blank, blank, blank, number(values["depth_max_mm"])]
-        )
+    for key, (label, factor) in DISTRIBUTIONS.items():
+        rows.append([label, *(number(figure(figures, f"{key}.{name}", factor)) for name in STATISTICS)])
+    if "hausdorff_mm" in figures:
+        bounds = f"{number(figures['hausdorff_mm'])} (at most {number(figures['hausdorff_upper_mm'])})"
+        means = (number(figures[f"{name}_surface_distance_mm"]) for name in ("mean", "rms"))
+        rows.append(["surface distance, mm", *means, number(None), number(None), bounds])
     return rows
+
+
+def _both_rows(figures: dict[str, Any]) -> list[list[str]]:
+    rows = [
+        [label, number(figure(figures, prediction, factor)), number(figure(figures, truth, factor))]
+        for label, prediction, truth, factor in BESIDE
+    ]
+    return [row for row in rows if row[1:] != [number(None)] * 2]
+
+
+def _band_rows(figures: dict[str, Any]) -> list[list[str]]:
+    """Curvature by wavelength."""
+    spectrum = figures.get("spectrum")
+    if spectrum is None:
+        return []
+    edges = spectrum["band_edges"]
+    names = [f"above {edges[0]:g}", *(f"{b:g} to {a:g}" for a, b in pairwise(edges)), f"below {edges[-1]:g}"]
+    rows = zip(names, spectrum["prediction"], spectrum["truth"], spectrum["kept"], strict=True)
+    return [
+        [name, number(prediction), number(truth), number(None if kept is None else 100.0 * kept)]
+        for name, prediction, truth, kept in rows
+    ]
 
 
 def _name(pair: PairScore) -> str:
@@ -122,10 +214,12 @@ def _frame_plots(pairs: Sequence[PairScore]) -> list[dict[str, str]]:
     ):
         lines: dict[str, Line] = {}
         for pair in moving:
-            values = getattr(pair.frames, attribute)
+            values = pair.frames.get(attribute)
             if values is None:
                 continue
-            frames = pair.frames.surface_frames if attribute == "hausdorff" else range(len(values))
+            sparse = pair.frames["surface_frames"] if attribute == "hausdorff" else None
+            # The first velocity is that of frame 1.
+            frames = sparse or range(pair.num_frames - len(values), pair.num_frames)
             rate = pair.fps or 1.0
             lines[_name(pair)] = ([frame / rate for frame in frames], values)
         if lines:
@@ -150,7 +244,8 @@ def _beta_plots(pairs: Sequence[PairScore]) -> list[dict[str, str]]:
         designs: dict[str, list[tuple[float, float]]] = {}
         for pair, beta in zip(still, betas, strict=True):
             name = pair.labels.get("design", "") or "garment"
-            designs.setdefault(name, []).append((float(beta[component]), pair.figures[key]))
+            if key in pair.figures:
+                designs.setdefault(name, []).append((float(beta[component]), pair.figures[key]))
         lines: dict[str, Line] = {}
         for name, points in designs.items():
             x, y = zip(*sorted(points), strict=True)
@@ -160,13 +255,24 @@ def _beta_plots(pairs: Sequence[PairScore]) -> list[dict[str, str]]:
     return plots
 
 
-def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
-    worst = sorted(comparison.pairs, key=lambda pair: -pair.figures["hausdorff_mm"])[:HEAT_MAPS]
+def _worst(comparison: Comparison) -> list[PairScore]:
+    """By the first of these figures that there is."""
+    for path in ("hausdorff_mm", "vertex_error_mm.max", "normal_error_deg.mean"):
+        known = [pair for pair in comparison.pairs if figure(pair.figures, path) is not None]
+        if known:
+            return sorted(known, key=lambda pair: -(figure(pair.figures, path) or 0.0))[:HEAT_MAPS]
+    return comparison.pairs[:HEAT_MAPS]
+
+
+def _loaded(comparison: Comparison, pair: PairScore) -> Pair:
     predictions, truths = comparison.subjects
+    return paired(predictions.load(pair.prediction), truths.load(pair.truth))
+
+
+def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
     entries = []
-    for pair in worst:
-        frame = pair.frames.surface_frames[int(np.argmax(pair.frames.hausdorff))]
-        both = paired(predictions.load(pair.prediction), truths.load(pair.truth))
+    for pair in _worst(comparison):
+        both, frame = _loaded(comparison, pair), _worst_frame(pair)
         entries.append(
             {
                 "picture": picture_source(heat_map(both.prediction, both.truth, frame)),
@@ -174,6 +280,24 @@ def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
             }
         )
     return entries
+
+
+def _worst_frame(pair: PairScore) -> int:
+    for name in ("hausdorff", "vertex_max"):
+        values = pair.frames.get(name)
+        if values:
+            frames = pair.frames.get("surface_frames") if name == "hausdorff" else None
+            worst = int(np.argmax(values))
+            return frames[worst] if frames else worst
+    return 0
+
+
+def _viewer(comparison: Comparison) -> Markup:
+    scenes = []
+    for pair in _worst(comparison):
+        both = _loaded(comparison, pair)
+        scenes.append(side_by_side(_name(pair), both.truth, {"prediction": both.prediction}))
+    return viewer(scenes, budget=SHOWN)
 
 
 def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
@@ -198,18 +322,26 @@ def heat_map(prediction: Track, truth: Track, frame: int) -> np.ndarray:
 
 
 def _pair_row(pair: PairScore) -> list[str]:
-    figures = pair.figures
-    vertex, velocity = figures["vertex_error_mm"], figures["velocity_error_mm_s"]
-    inside = figures["penetration"]
+    def shown(path: str, factor: float = 1.0) -> str:
+        return number(figure(pair.figures, path, factor))
+
     return [
         pair.truth,
         pair.labels.get("design", ""),
         pair.labels.get("sequence", "") or pair.labels.get("shape", ""),
         str(pair.num_frames),
-        number(vertex and vertex["mean"]),
-        number(vertex and vertex["max"]),
-        number(velocity and velocity["mean"]),
-        number(figures["mean_surface_distance_mm"]),
-        number(figures["hausdorff_mm"]),
-        number(inside and 100 * inside["ratio"]),
+        shown("vertex_error_mm.mean"),
+        shown("vertex_error_mm.max"),
+        shown("velocity_error_mm_s.mean"),
+        shown("mean_surface_distance_mm"),
+        shown("hausdorff_mm"),
+        shown("spectrum.wrinkles_kept", 100.0),
+        shown("penetration.ratio", 100.0),
+        _sum(pair.figures, ("body_intersections.pairs_mean", "self_intersections.pairs_mean")),
     ]
+
+
+def _sum(figures: dict[str, Any], paths: Sequence[str]) -> str:
+    values = [figure(figures, path) for path in paths]
+    known = [value for value in values if value is not None]
+    return number(sum(known) if known else None)

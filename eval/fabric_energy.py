@@ -98,7 +98,7 @@ class FabricEnergy:
 
         Raises InputError if the sample names no fabric that is known here.
         """
-        fabrics, gravity = _setting(sample)
+        fabrics, gravity = setting_of(sample)
         return cls(sample.frame_garment(frame), fabrics, gravity)
 
     def energy(self, positions: np.ndarray) -> Energy:
@@ -122,8 +122,11 @@ class FabricEnergy:
         return float(found.numpy()[0])
 
 
-def _setting(sample: Sample) -> tuple[list[Fabric], tuple[float, float, float]]:
-    """Fabrics of all garments of a sample from inside out, and gravity, m/s^2."""
+def setting_of(sample: Sample) -> tuple[list[Fabric], tuple[float, float, float]]:
+    """Fabrics of all garments of a sample from inside out, and gravity, m/s^2.
+
+    Raises InputError if it names no fabric that is known here.
+    """
     from muslin.sim.scene import parse_scene
     from muslin.sim.setting import fabric_of, load_choice
     from muslin.sim.world.placing import copies

@@ -23,13 +23,16 @@ class MaterialPoints:
         self._known: dict[tuple[int, int], Correspondence] = {}
         self.by_panel_space = False
 
-    def positions(self, track: Track, frame: int, target: Track, target_frame: int) -> np.ndarray:
-        """Where in `frame` of `track` the points lie that `target`'s vertices are in `target_frame`.
+    def carried(
+        self, x: np.ndarray, track: Track, frame: int, target: Track, target_frame: int, count: int
+    ) -> np.ndarray:
+        """Positions x (V', 3) of `track` in `frame`, at the points that the `count` vertices of `target` are
+        in `target_frame`.
 
-        (V, 3), metres, V of the target. Raises InputError if the points do not correspond.
+        (count, 3), metres. Raises InputError if the points do not correspond.
         """
-        x, faces = track.positions[frame], track.faces[frame]
-        same_count = len(x) == len(target.positions[target_frame])
+        faces = track.faces[frame]
+        same_count = len(x) == count
         if same_count and (
             self._vertices_correspond or self._same_triangles(faces, target.faces[target_frame])
         ):

@@ -50,6 +50,15 @@ def evaluate(
     surface_frames: Annotated[
         int, typer.Option("--surface-frames", min=1, help="Most frames of a sequence with surface distances.")
     ] = 24,
+    metrics: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--metrics",
+            metavar="NAME",
+            help="Families of metrics, repeatable: standard, all, vertex, motion, surface, normals, folds, "
+            "curvature, spectrum, strain, change, body-contact, self-contact, energy.",
+        ),
+    ] = None,
     baseline: Annotated[
         Path | None,
         typer.Option("--baseline", metavar="FILE", help="Exit with 1 if a figure is worse than in there."),
@@ -67,7 +76,7 @@ def evaluate(
         typer.Option("--write-baseline", metavar="FILE", help="Write a baseline there, replacing the last."),
     ] = None,
 ) -> None:
-    """Score a prediction: vertex, velocity and surface errors, and how much is inside the body.
+    """Score a prediction: errors of vertices, motion, surfaces and wrinkles; strain, penetration, crossings.
 
     Either side is a dataset, one sample (DIR/samples/ID.zarr), a file (.obj .ply .glb .stl .off .npy .npz
     .pkl .pc2 .pc16 .usd .abc), a folder of meshes, or a folder with a file or a folder a sample, named as it;
@@ -105,6 +114,7 @@ def evaluate(
         result = compare(
             prediction,
             truth,
+            metrics=metrics or ["standard"],
             surface_frames=surface_frames,
             progress=update,
             prediction_options=ReadOptions(fps, scale, up, faces),
@@ -135,17 +145,29 @@ def _summary(figures: dict) -> list[str]:
     for label, key, unit in (
         ("vertex error", "vertex_error_mm", "mm"),
         ("velocity error", "velocity_error_mm_s", "mm/s"),
+        ("angle of normals", "normal_error_deg", "degrees"),
     ):
-        if figures[key] is not None:
+        if figures.get(key) is not None:
             values = "  ".join(f"{name} {figures[key][name]:.4g}" for name in ("mean", "rms", "p95", "max"))
             lines.append(f"{label:18} {values} {unit}")
-    lines.append(f"{'surface distance':18} mean {figures['mean_surface_distance_mm']:.4g} mm")
-    lines.append(
-        f"{'Hausdorff':18} {figures['hausdorff_mm']:.4g} mm (at most {figures['hausdorff_upper_mm']:.4g})"
-    )
-    if figures["penetration"] is not None:
-        inside = figures["penetration"]
+    if "hausdorff_mm" in figures:
+        lines.append(f"{'surface distance':18} mean {figures['mean_surface_distance_mm']:.4g} mm")
+        upper = figures["hausdorff_upper_mm"]
+        lines.append(f"{'Hausdorff':18} {figures['hausdorff_mm']:.4g} mm (at most {upper:.4g})")
+    kept = (figures.get("spectrum") or {}).get("wrinkles_kept")
+    if kept is not None:
+        lines.append(f"{'wrinkles kept':18} {100 * kept:.3g} %")
+    inside = figures.get("penetration")
+    if inside is not None:
         lines.append(
-            f"{'inside the body':18} {100 * inside['ratio']:.3g} %, at most {inside['depth_max_mm']:.3g} mm"
+            f"{'inside the body':18} {100 * inside['ratio']:.3g} % of vertices, "
+            f"{100 * inside['area_ratio']:.3g} % of the area, at most {inside['surface_depth_max_mm']:.3g} mm"
         )
+    for label, key in (
+        ("crossing the body", "body_intersections"),
+        ("crossing itself", "self_intersections"),
+    ):
+        found = figures.get(key)
+        if found is not None:
+            lines.append(f"{label:18} {found['pairs_mean']:.4g} pairs of triangles a frame")
     return lines + [f"note: {note}" for note in figures["notes"]]

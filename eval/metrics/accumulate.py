@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from muslin.eval.metrics.penetration import Penetration, penetration
 from muslin.eval.metrics.vertex import Statistics, statistics
 
 
@@ -27,6 +26,16 @@ class ErrorAccumulator:
             np.ones(errors.shape, np.float32) if weights is None else weights.astype(np.float32)
         )
 
+    def merge(self, other: ErrorAccumulator) -> None:
+        """Add the frames of another."""
+        self.errors += other.errors
+        self.weights += other.weights
+
+    def weighted_means(self, factor: float = 1.0) -> list[float]:
+        """Mean of each frame by the weights given, times a factor."""
+        pairs = zip(self.errors, self.weights, strict=True)
+        return [factor * float(np.average(e, weights=w)) for e, w in pairs]
+
     def result(self) -> Statistics | None:
         """Plain statistics; None if no frame came."""
         return statistics(np.concatenate(self.errors)) if self.errors else None
@@ -36,17 +45,3 @@ class ErrorAccumulator:
         if not self.errors:
             return None
         return statistics(np.concatenate(self.errors), np.concatenate(self.weights))
-
-
-@dataclass
-class PenetrationAccumulator:
-    """Collects signed distances of frames; penetration over every vertex of every frame."""
-
-    distances: list[np.ndarray] = field(default_factory=list)
-
-    def update(self, distances: np.ndarray) -> None:
-        """distances (V,), metres, negative inside."""
-        self.distances.append(distances.astype(np.float32))
-
-    def result(self) -> Penetration | None:
-        return penetration(np.concatenate(self.distances)) if self.distances else None

@@ -39,7 +39,12 @@ def test_lifted_sheet_scores_its_lift(tmp_path, make_sample):
     assert result["hausdorff_mm"] == pytest.approx(5.0, abs=1e-3)
     assert 5.0 <= result["hausdorff_upper_mm"] + 1e-4 <= 5.06
     assert result["mean_surface_distance_mm"] == pytest.approx(5.0, abs=1e-3)
-    assert result["penetration"] == {"ratio": 0.0, "depth_mean_mm": 0.0, "depth_max_mm": 0.0}
+    assert result["penetration"]["method"] == "winding number"
+    assert not any(value for name, value in result["penetration"].items() if name != "method")
+    assert result["normal_error_deg"]["max"] == pytest.approx(0.0, abs=1e-3)
+    assert result["dihedral_error_deg"]["max"] == pytest.approx(0.0, abs=1e-3)
+    assert result["edge_length_error"]["max"] == pytest.approx(0.0, abs=1e-5)
+    assert result["self_intersections"]["pairs_max"] == result["body_intersections"]["pairs_max"] == 0
     assert (result["samples"], result["frames"]) == (2, 5)
     assert json.loads(compare(tmp_path / "prediction", tmp_path / "truth").to_json()) == result
 
@@ -121,7 +126,7 @@ def test_an_obj_sequence_against_a_dataset_asks_for_the_rate(tmp_path, make_samp
 def test_few_surface_frames_are_said(tmp_path, make_sample):
     write_dataset(tmp_path / "t", [make_sample("a", frames=9)])
     result = compare(tmp_path / "t", tmp_path / "t", surface_frames=3)
-    assert result.pairs[0].frames.surface_frames == [0, 4, 8]
+    assert result.pairs[0].frames["surface_frames"] == [0, 4, 8]
     assert any("3 of 9" in note for note in result.notes)
 
 

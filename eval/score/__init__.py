@@ -1,0 +1,1 @@
+"""Families of metrics, fed frame by frame."""

@@ -1,0 +1,66 @@
+"""Distances between the surfaces, whatever their triangles."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+
+from muslin.eval.metrics.hausdorff import hausdorff
+from muslin.eval.metrics.surface_sampling import surface_distance
+from muslin.eval.read.pairing import Pair
+from muslin.eval.score.family import MM, Family
+from muslin.eval.score.frame import PairFrame
+
+FRAMES = 24
+"""Most frames of a sequence that are measured, unless told otherwise."""
+
+
+class SurfaceDistances(Family):
+    """Hausdorff distance with its bounds, mean and rms distance; of some frames, evenly spread."""
+
+    name, what = "surface", "surface distances are"
+
+    def __init__(self, pair: Pair, most_frames: int = FRAMES) -> None:
+        super().__init__(pair)
+        count = pair.truth.num_frames
+        chosen = np.unique(np.linspace(0, count - 1, min(count, most_frames)).round().astype(int))
+        self.chosen = [int(t) for t in chosen]
+        if len(self.chosen) < count:
+            self.notes.append(
+                f"surface distances of {len(self.chosen)} of {count} frames of a sequence, evenly spread"
+            )
+        self.lower: list[float] = []
+        self.upper: list[float] = []
+        self.mean: list[float] = []
+        self.rms: list[float] = []
+
+    def update(self, frame: PairFrame) -> None:
+        if frame.t not in self.chosen:
+            return
+        sides = (frame.predicted, frame.predicted_faces, frame.true, frame.true_faces)
+        bounds, distance = hausdorff(*sides), surface_distance(*sides)
+        self.lower.append(bounds.lower)
+        self.upper.append(bounds.upper)
+        self.mean.append(distance.mean)
+        self.rms.append(distance.rms)
+
+    def merge(self, other: Self) -> None:
+        for name in ("lower", "upper", "mean", "rms"):
+            getattr(self, name).extend(getattr(other, name))
+
+    def figures(self) -> dict[str, Any]:
+        return {
+            "hausdorff_mm": MM * max(self.lower),
+            "hausdorff_upper_mm": MM * max(self.upper),
+            "hausdorff_mean_mm": MM * float(np.mean(self.lower)),
+            "mean_surface_distance_mm": MM * float(np.mean(self.mean)),
+            "rms_surface_distance_mm": MM * float(np.sqrt(np.mean(np.square(self.rms)))),
+        }
+
+    def frames(self) -> dict[str, list[Any]]:
+        return {
+            "surface_frames": list(self.chosen),
+            "hausdorff": [MM * value for value in self.lower],
+            "surface": [MM * value for value in self.mean],
+        }
