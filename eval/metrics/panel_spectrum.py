@@ -44,8 +44,11 @@ class PanelImage:
         ny, nx = self.window.shape
         across = np.fft.rfftfreq(nx, self.spacing)
         size = np.hypot(np.fft.fftfreq(ny, self.spacing)[:, None], across)
-        alone = (across == 0.0) | (across == 0.5 / self.spacing)
-        return size, np.broadcast_to(np.where(alone, 1.0, 2.0), size.shape)
+        often = np.full(len(across), 2.0)
+        often[0] = 1.0
+        if nx % 2 == 0:
+            often[-1] = 1.0
+        return size, np.broadcast_to(often, size.shape)
 
     def power(self, columns: np.ndarray) -> np.ndarray:
         """|F(w (h - m))_k|^2 / N, counted as often as it stands in the whole transform, the mean m's energy

@@ -27,15 +27,17 @@ def round_cut() -> tuple[np.ndarray, np.ndarray]:
     return FACES[((middle - [0.3, 0.25]) ** 2 @ [1 / 0.28**2, 1 / 0.23**2]) < 1.0], UV
 
 
-def test_bands_add_up_to_the_mean_square_in_the_window():
+@pytest.mark.parametrize("spacing", [0.01, 0.0095, 0.013, 0.0142, 0.021])
+def test_bands_add_up_to_the_mean_square_in_the_window(spacing):
     values = np.random.default_rng(0).normal(size=(3, len(UV), 2))
-    (image,) = IMAGES
+    images = panel_images(FACES, UV[FACES], ONE, spacing)
+    (image,) = images
     drawn = np.stack([image.sampling @ frame for frame in values])
     expected = np.square(drawn).sum(axis=(1, 2)) / np.square(image.window).sum()
-    found = panel_energies(IMAGES, values)
+    found = panel_energies(images, values)
     assert found.shape == (3, len(PANEL_BAND_EDGES) + 1)
     assert found.sum(axis=1) == pytest.approx(expected, rel=1e-12)
-    assert panel_energies(IMAGES, values[1]) == pytest.approx(found[1])
+    assert panel_energies(images, values[1]) == pytest.approx(found[1])
 
 
 def test_image_of_a_linear_function_is_that_function_in_the_window():
