@@ -99,10 +99,11 @@ def _array(value: Any, name: str, most_bytes: int) -> np.ndarray:
     """An array, a number, or a list of one array a frame."""
     if not isinstance(value, (list, tuple)):
         return _plain(value, name)
-    frames = [_plain(item, name) for item in value]
-    if sum(frame.nbytes for frame in frames) > most_bytes:
+    distinct = {id(item): item for item in value}
+    arrays = {key: _plain(item, name) for key, item in distinct.items()}
+    if sum(arrays[id(item)].nbytes for item in value) > most_bytes:
         raise InputError(f"'{name}' repeats arrays to more than {most_bytes} bytes; refused, write one array")
-    return np.stack(frames)
+    return np.stack([arrays[id(item)] for item in value])
 
 
 def _plain(value: Any, name: str) -> np.ndarray:

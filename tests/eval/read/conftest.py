@@ -15,7 +15,7 @@ from muslin.eval.read.track import Track
 
 @dataclass(frozen=True)
 class Scene:
-    """positions (T, V, 3), faces (F, 3) of the sheet, which rises 1 cm a frame; body and body_faces: a ball"""
+    """positions (T, V, 3), faces (F, 3) of the sheet, which rises 1 cm a frame; body, body_faces: a ball"""
 
     positions: np.ndarray
     faces: np.ndarray
@@ -33,7 +33,7 @@ def make_scene(n: int = 6, frames: int = 4) -> Scene:
     level = np.stack([X.ravel(), np.full(n * n, 0.21) + 0.01 * X.ravel(), Z.ravel()], axis=1)
     i = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     faces = np.concatenate([np.c_[i, i + 1, i + n + 1], np.c_[i, i + n + 1, i + n]])
-    positions = np.stack([level + [0, 0.01 * t, 0] for t in range(frames)]).astype(np.float32)
+    positions = np.stack([level + np.array([0, 0.01 * t, 0]) for t in range(frames)]).astype(np.float32)
     ball = trimesh.creation.icosphere(1, 0.2)
     return Scene(positions, faces, np.array(ball.vertices, np.float32), np.array(ball.faces))
 
@@ -45,7 +45,12 @@ def scene() -> Scene:
 
 def cache(positions: np.ndarray, dtype: str = "<f4", **header: int | bytes) -> bytes:
     """A point cache; `header` replaces fields: magic, version, points, samples."""
-    fields = {"magic": b"POINTCACHE2\0", "version": 1, "points": positions.shape[1], "samples": len(positions)}
+    fields = {
+        "magic": b"POINTCACHE2\0",
+        "version": 1,
+        "points": positions.shape[1],
+        "samples": len(positions),
+    }
     fields |= header
     head = struct.pack(
         "<12siiffi", fields["magic"], fields["version"], fields["points"], 0.0, 1.0, fields["samples"]

@@ -46,7 +46,9 @@ def test_corners_of_stl_are_sewn(tmp_path, scene, kind):
     found = read_mesh(path)
     assert len(found.vertices) == len(scene.positions[0])
     np.testing.assert_allclose(found.vertices[found.faces], mesh.triangles, atol=1e-7)
-    np.testing.assert_array_equal(np.unique(found.faces.ravel(), return_index=True)[0], range(len(found.vertices)))
+    np.testing.assert_array_equal(
+        np.unique(found.faces.ravel(), return_index=True)[0], range(len(found.vertices))
+    )
     first = np.unique(found.faces.ravel(), return_index=True)[1]
     assert (np.diff(first) > 0).all(), "numbered by first appearance"
 
@@ -71,7 +73,7 @@ def test_parts_of_a_glb_are_told_apart_by_name(tmp_path, scene):
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
-        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n", "4000000000"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 4000000000\nend_header\n", "4000000000"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex -1\nend_header\n", "-1"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex many\nend_header\n", "no count"),
         ("a.ply", b"plx\n", "must begin with 'ply'"),
@@ -87,7 +89,7 @@ def test_parts_of_a_glb_are_told_apart_by_name(tmp_path, scene):
         ("a.glb", glb({"asset": {}})[:-1], "header says"),
         ("a.glb", glb({"animations": [{}]}), "animated"),
         ("a.glb", glb({"extensionsRequired": ["KHR_draco_mesh_compression"]}), "compressed"),
-        ("a.glb", glb({"accessors": [{"count": 10**12, "type": "VEC3", "componentType": 5126}]}), "1000000000000"),
+        ("a.glb", glb({"accessors": [{"count": 10**12, "type": "VEC3"}]}), "1000000000000"),
         ("a.glb", glb({"asset": {"version": "2.0"}}), "no triangles|not readable"),
         ("a.obj", b"\xff\xfe\0", "text"),
         ("a.fbx", b"", "no mesh format"),
