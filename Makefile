@@ -55,7 +55,7 @@ $(VENV)/installed-core: $(VENV)/created $(PINS)
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/created $(PINS)
-	$(INSTALL) --no-build-isolation --editable '.[dev,usd]'
+	$(INSTALL) --no-build-isolation --editable '.[dev,usd,alembic]'
 	@touch $(VENV)/installed-core $@
 
 # setuptools is installed first because the editable installs above build without isolation.
