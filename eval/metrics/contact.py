@@ -24,13 +24,16 @@ from muslin.eval.metrics.triangle_pairs import (
 )
 from muslin.eval.metrics.triangle_samples import TriangleSamples, triangle_samples
 from muslin.eval.metrics.vertex import triangle_areas
-from muslin.eval.metrics.winding import cloth_winding_numbers
+from muslin.eval.metrics.winding import cloth_winding_numbers, winding_numbers
 
 SPACING = 1e-2  # metres
 CROSSED_SPLIT = 4
 DOUBTFUL_SPLIT = 16
 """Parts that an edge of a triangle is cut into for samples: where the body crosses it, and where its exact
 area inside is not known."""
+
+NUDGE = 1e-6
+"""Share of the spacing by which a sample is moved off the cloth to see on which side of the skin it is."""
 
 
 @dataclass(frozen=True)
@@ -181,12 +184,15 @@ def _inside_closed(
     samples = [triangle_samples(cloth, faces, np.flatnonzero(whole), spacing)]
     all_areas = triangle_areas(cloth, faces)
     area, sampled = float(all_areas[whole].sum() + areas[exact].sum()), 0.0
-    for rows, split in ((exact, CROSSED_SPLIT), (~exact, DOUBTFUL_SPLIT)):
-        part = _inside_crossed(triangle_samples(cloth, faces, crossed.faces[rows], spacing, split), crossed)
-        samples.append(part)
-        if split == DOUBTFUL_SPLIT:
-            area += float(part.areas.sum())
-            sampled = float(all_areas[crossed.faces[rows]].sum())
+    samples.append(
+        _inside_crossed(triangle_samples(cloth, faces, crossed.faces[exact], spacing, CROSSED_SPLIT), crossed)
+    )
+    doubtful = crossed.faces[~exact]
+    if len(doubtful):
+        tried = triangle_samples(cloth, faces, doubtful, spacing, DOUBTFUL_SPLIT)
+        samples.append(_inside_doubtful(tried, cloth, faces, body, body_faces, NUDGE * spacing))
+        area += float(samples[-1].areas.sum())
+        sampled = float(all_areas[doubtful].sum())
     vertices = np.flatnonzero(winding > 0)
     points = np.concatenate([cloth[vertices], *(part.points for part in samples)])
     distances = nearest_distances(points, body, body_faces)
@@ -207,6 +213,24 @@ def _inside_crossed(samples: TriangleSamples, crossed: CrossedTriangles) -> Tria
     row = np.searchsorted(crossed.faces, samples.faces)
     points = np.einsum("sk,skx->sx", samples.weights, crossed.corners[row])
     return samples.where(winding_at(crossed, row, points) > 0)
+
+
+def _inside_doubtful(
+    samples: TriangleSamples,
+    cloth: np.ndarray,
+    faces: np.ndarray,
+    body: np.ndarray,
+    body_faces: np.ndarray,
+    nudge: float,
+) -> TriangleSamples:
+    """Those of the samples with the body on both sides of the cloth, `nudge` metres from it: so a cloth that
+    lies on the skin is outside."""
+    a, b, c = (cloth[faces[samples.faces, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal *= nudge / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    both = np.concatenate([samples.points + normal, samples.points - normal])
+    inside = winding_numbers(both, body, body_faces).reshape(2, -1) > 0
+    return samples.where(inside.all(axis=0))
 
 
 def _inside_open(

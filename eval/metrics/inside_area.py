@@ -12,7 +12,7 @@ from muslin.eval.metrics.contours import segments
 from muslin.eval.metrics.triangle_pairs import TrianglePairs
 
 CLOSED = 1e-9
-"""Relative error up to which the winding number must come back to itself along a triangle's boundary."""
+"""Rounding, relative to areas and lengths, of what lies in a triangle's plane."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class CrossedTriangles:
     faces      (C,) indices of the cloth's faces
     corners    (C, 3, 2) metres, counter-clockwise, in the triangle's own plane
     winding    (C, 3) the body's winding number at the corners
+    coplanar   (C,) whether a triangle of the body lies in the same plane and meets it
     row        (S,) which of the triangles each segment belongs to
     ends       (S, 2, 2) the segments; on their left the winding number is one more than on their right
     by_edge    (S, 2) whether that end lies on the triangle's boundary, on the edge `edge` (S, 2)
@@ -30,6 +31,7 @@ class CrossedTriangles:
     faces: NDArray[np.int64]
     corners: NDArray[np.float64]
     winding: NDArray[np.int64]
+    coplanar: NDArray[np.bool_]
     row: NDArray[np.int64]
     ends: NDArray[np.float64]
     by_edge: NDArray[np.bool_]
@@ -46,6 +48,7 @@ def crossed_triangles(
 ) -> CrossedTriangles:
     """The triangles of `pairs` (all pairs that intersect), given the winding number at each vertex (V,)."""
     faces, row = np.unique(pairs.faces[:, 0], return_inverse=True)
+    coplanar = np.bincount(row[pairs.coplanar], minlength=len(faces)) > 0
     crossing = ~pairs.coplanar
     row = row[crossing]
     triangles = cloth[cloth_faces[faces]]
@@ -62,6 +65,7 @@ def crossed_triangles(
         faces=faces,
         corners=np.einsum("cjx,ckx->cjk", triangles - origin[:, None], frame),
         winding=winding[cloth_faces[faces]],
+        coplanar=coplanar,
         row=row,
         ends=np.einsum("sjx,skx->sjk", ends - origin[row][:, None], frame[row]),
         by_edge=found.by_a[some],
@@ -78,16 +82,17 @@ def inside_areas(crossed: CrossedTriangles) -> tuple[NDArray[np.float64], NDArra
         integral w dA = 1/2 sum_edges (p x q) integral_0^1 w(t) dt + 1/2 sum_segments (a x b),
         integral_0^1 w(t) dt = w(p) + sum_k s_k (1 - t_k).
 
-    False where that does not hold: where the body overlaps itself (w is not 0 or 1 at a corner, or the
-    integral is not between 0 and the area), or where rounding lost or doubled a crossing, so that w(q) is not
-    w(p) + sum_k s_k. Such triangles are to be sampled (`winding_at`).
+    False where that does not hold: where a face of the body lies in the plane, where it overlaps itself (w is
+    not 0 or 1 at a corner, or the integral is not between 0 and the area), or where rounding lost or doubled
+    a crossing, so that w(q) is not w(p) + sum_k s_k, or may have, at a corner. Such triangles are to be
+    sampled.
     """
     count = len(crossed.faces)
     p = crossed.corners
     q = np.roll(p, -1, axis=1)
     a, b = crossed.ends[:, 0], crossed.ends[:, 1]
     total = np.bincount(crossed.row, weights=0.5 * _cross(a, b), minlength=count).astype(np.float64)
-    jump, late = np.zeros((count, 3)), np.zeros((count, 3))
+    jump, late, at_corner = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
     for end, step in ((0, -1.0), (1, 1.0)):
         # Below the plane of the body's face lies on the left: a boundary run counter-clockwise enters the
         # body where a segment ends and leaves it where one starts.
@@ -96,6 +101,7 @@ def inside_areas(crossed: CrossedTriangles) -> tuple[NDArray[np.float64], NDArra
         start, along = p[row, edge], q[row, edge] - p[row, edge]
         square = np.maximum(np.einsum("ki,ki->k", along, along), np.finfo(float).tiny)
         t = np.einsum("ki,ki->k", crossed.ends[on, end] - start, along) / square
+        at_corner[row[(t < CLOSED) | (t > 1.0 - CLOSED)]] = True
         np.add.at(jump, (row, edge), step)
         np.add.at(late, (row, edge), step * (1.0 - t))
     total += (0.5 * _cross(p, q) * (crossed.winding + late)).sum(axis=1)
@@ -103,7 +109,7 @@ def inside_areas(crossed: CrossedTriangles) -> tuple[NDArray[np.float64], NDArra
     simple = ((crossed.winding == 0) | (crossed.winding == 1)).all(axis=1)
     closed = (crossed.winding + jump == np.roll(crossed.winding, -1, axis=1)).all(axis=1)
     bounded = (total >= -CLOSED * area) & (total <= (1.0 + CLOSED) * area)
-    return np.clip(total, 0.0, area), simple & closed & bounded
+    return np.clip(total, 0.0, area), simple & closed & bounded & ~crossed.coplanar & ~at_corner
 
 
 def winding_at(crossed: CrossedTriangles, row: NDArray[np.int64], points: np.ndarray) -> NDArray[np.int64]:

@@ -131,6 +131,23 @@ def test_a_large_triangle_between_its_vertices():
     assert found.surface_depth == pytest.approx(1 - HEIGHT, abs=0.1)
 
 
+@pytest.mark.parametrize("parts", [4, 6, 8])
+def test_cloth_with_edges_in_the_faces_of_a_box(parts):
+    # Lines of the sheet lie in the box's sides, or all of it in the top: the figures are sampled, and say so.
+    box = trimesh.creation.box(extents=(2, 2, 2))
+    v, f = np.array(box.vertices), np.array(box.faces)
+    uv, faces = sheet(4.0, 4.0, parts, parts)
+    through = body_contact(lifted(uv - 2.0, 0.25), faces, v, f, spacing=0.1)
+    assert through.area_inside == pytest.approx(4.0)
+    assert through.contour == pytest.approx(8.0)
+    # The depth is 3/4 or the distance to the nearest side: a pyramid's frustum of height 3/4.
+    assert through.volume == pytest.approx(4 / 3 * (1 - 0.25**3), rel=5e-3)
+    on_top = body_contact(lifted(uv - 2.0, 1.0), faces, v, f, spacing=0.1)
+    assert on_top.area_inside == pytest.approx(0.0)
+    assert on_top.coplanar > 0
+    assert on_top.area_sampled >= 4.0
+
+
 def test_masked_faces_do_not_count_but_bound():
     uv, f = sheet(3.0, 3.0, 9, 9)
     v = lifted(uv - 1.5, HEIGHT)
