@@ -81,17 +81,18 @@ class Outcome:
         return mean_interval(self.values(method, same, figure), self.clusters(same), **self._options())
 
     def paired(self, first: str, second: str, ids: Sequence[str], figure: str) -> Paired | None:
-        """Two methods on the samples that every method has the figure of; None if there is none."""
-        same = self.common(ids, figure)
+        """Two methods on the samples that every method has the figure of; None if there is none.
+
+        Of a metric that is best at one, it is the distances from one that are compared.
+        """
+        same, metric = self.common(ids, figure), self.protocol.metric(figure)
         if not same:
             return None
-        return paired(
-            self.values(first, same, figure),
-            self.values(second, same, figure),
-            self.clusters(same),
-            lower_is_better=self.protocol.metric(figure).better == "lower",
-            **self._options(),
-        )
+        a, b = self.values(first, same, figure), self.values(second, same, figure)
+        if metric.better == "one":
+            a, b = [metric.loss(value) for value in a], [metric.loss(value) for value in b]
+        lower = metric.better != "higher"
+        return paired(a, b, self.clusters(same), lower_is_better=lower, **self._options())
 
     def clusters(self, ids: Sequence[str]) -> list[str] | None:
         """What is drawn together in the bootstrap; None draws sample by sample."""

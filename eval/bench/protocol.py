@@ -6,6 +6,8 @@ source = "Whom to cite"
 dataset = "out/data"                       # the truth; or --dataset
 train = ["train"]                          # splits that methods learn from; scored only by a group's splits
 
+families = ["vertex", "surface"]           # of metrics that are computed (muslin eval --metrics)
+
 [select]                                   # which samples are scored; every group narrows this
 kind = "drape"
 where = { fabric = ["gray-interlock"] }    # labels of a sample: design, shape, fabric, sequence, topology …
@@ -97,16 +99,25 @@ class Group(Selection):
 
 
 class Metric(_Strict):
-    """A figure of each sample; in means every sample counts alike, whatever its frames and vertices are."""
+    """A figure of each sample; in means every sample counts alike, whatever its frames and vertices are.
+
+    better   lower, higher, or nearer to "one", such as a share of energy that was kept
+    """
 
     figure: Text
     title: Text
     unit: str = ""
-    better: Literal["lower", "higher"] = "lower"
+    better: Literal["lower", "higher", "one"] = "lower"
 
     @property
     def heading(self) -> str:
         return f"{self.title}, {self.unit}" if self.unit else self.title
+
+    def loss(self, value: float) -> float:
+        """Of which less is better."""
+        if self.better == "one":
+            return abs(value - 1.0)
+        return value if self.better == "lower" else -value
 
 
 class Table(_Strict):
@@ -179,13 +190,17 @@ class Bootstrap(_Strict):
 
 
 class Protocol(_Strict):
-    """A benchmark; see the head of this file."""
+    """A benchmark; see the head of this file.
+
+    families   of metrics that are computed, `muslin.eval.score.families`
+    """
 
     name: Name
     title: Text
     source: Text
     dataset: str | None = None
     train: list[Text] = ["train"]
+    families: list[Text] = Field(default=["standard"], min_length=1)
     surface_frames: int = Field(default=24, ge=1)
     select: Selection = Selection()
     groups: list[Group] = [Group(name=ALL)]

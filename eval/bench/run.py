@@ -12,6 +12,7 @@ from muslin.eval.bench.protocol import Protocol
 from muslin.eval.bench.score import Score, Task, check_figures, scores
 from muslin.eval.bench.select import entries, grouped, labels_needed
 from muslin.eval.provenance import provenance
+from muslin.eval.score.families import chosen
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.processes import usable_cores
@@ -45,6 +46,7 @@ def bench(
         raise InputError(f"protocol {protocol.name}: names no dataset; give one with --dataset")
     if not methods:
         raise InputError("no method to score; give at least one, --method NAME=DIR")
+    chosen(protocol.families)  # raises for one that is none, before the long work
     truth = Path(given)
     samples = entries(open_dataset(truth), labels_needed(protocol))
     groups = grouped(protocol, samples, str(truth))
@@ -58,6 +60,7 @@ def bench(
             method.predictions[i],
             store.sample_path(truth, i),
             None if method.is_dataset else entry.fps,
+            tuple(protocol.families),
             protocol.surface_frames,
         )
         for i, entry in scored.items()

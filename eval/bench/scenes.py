@@ -31,10 +31,11 @@ def worst_median_best(outcome: Outcome, ids: Sequence[str]) -> dict[str, str]:
     """{"worst", "median", "best": sample} by the first metric, averaged over methods; each sample once."""
     metric = outcome.protocol.metrics[0]
     same = outcome.common(ids, metric.figure)
-    means = {
-        i: np.mean([outcome.value(method, i, metric.figure) for method in outcome.methods]) for i in same
+    losses = {
+        i: sum(metric.loss(v) for m in outcome.methods for v in outcome.values(m, [i], metric.figure))
+        for i in same
     }
-    ranked = sorted(same, key=lambda i: means[i], reverse=metric.better == "lower")
+    ranked = sorted(same, key=lambda i: losses[i], reverse=True)
     places = {"worst": 0, "median": len(ranked) // 2, "best": len(ranked) - 1}
     chosen: dict[str, str] = {}
     for what, place in places.items():

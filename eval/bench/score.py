@@ -25,6 +25,7 @@ class Task:
     prediction: Path
     truth: Path
     fps: float | None
+    families: tuple[str, ...]
     surface_frames: int
 
 
@@ -66,7 +67,13 @@ def scores(tasks: Sequence[Task], workers: int) -> Iterator[Score]:
 def run(task: Task) -> Score:
     """Score one prediction."""
     try:
-        found = compare(task.prediction, task.truth, fps=task.fps, surface_frames=task.surface_frames)
+        found = compare(
+            task.prediction,
+            task.truth,
+            fps=task.fps,
+            metrics=task.families,
+            surface_frames=task.surface_frames,
+        )
     except InputError as error:
         return Score(task.method, task.sample, refused=" ".join(str(error).split()))
     values = found.to_dict()

@@ -90,7 +90,8 @@ def duels(outcome: Outcome) -> list[Duel]:
         for group, metric in product(outcome.protocol.groups, outcome.protocol.metrics):
             result = outcome.paired(first, second, outcome.groups[group.name], metric.figure)
             if result is not None:
-                found.append(Duel(first, second, group.label, metric.heading, result))
+                name = f"{metric.title}, off 1" if metric.better == "one" else metric.heading
+                found.append(Duel(first, second, group.label, name, result))
     return found
 
 

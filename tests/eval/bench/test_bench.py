@@ -11,6 +11,7 @@ from muslin.eval.bench.methods import open_method, parse_methods
 from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.protocol import parse_protocol
 from muslin.eval.bench.run import bench
+from muslin.eval.bench.scenes import worst_median_best
 from muslin.eval.bench.score import figure_value
 from muslin.eval.bench.tables import duels, fill
 from muslin.garments.errors import InputError
@@ -25,6 +26,7 @@ RISE = {"a": 1e-3, "b": 2e-3}
 
 def protocol(**values):
     base = {"name": "p", "title": "P", "source": "S", "metrics": [METRIC], "tables": [TABLE]}
+    base["families"] = ["vertex", "motion"]
     return parse_protocol(base | values)
 
 
@@ -124,6 +126,15 @@ def test_higher_is_better_where_a_metric_says_so(data):
     assert duel.found.difference.mean == pytest.approx((1 + 1 + 2 + 1) / 4 - 3, abs=1e-3)
 
 
+def test_nearer_to_one_is_better_where_a_metric_says_so(data):
+    # 1, 1, 2, 1 against 3 everywhere: off one by 0, 0, 1, 0 and by 2.
+    outcome = run(data, {"one": "one", "two": "two"}, metrics=[METRIC | {"better": "one"}])
+    (duel,) = duels(outcome)
+    assert (duel.found.first, duel.metric) == (4, "vertex error, off 1")
+    assert duel.found.difference.mean == pytest.approx(0.25 - 2.0, abs=1e-3)
+    assert worst_median_best(outcome, outcome.groups["all"])["worst"] == "b-s0-t0"
+
+
 def test_labels_as_x_and_clusters(data):
     figure = {"title": "F", "x": "design", "y": "vertex_error_mm.mean"}
     outcome = run(data, {"one": "one"}, figures=[figure], bootstrap={"cluster": "design"})
@@ -146,6 +157,7 @@ def test_labels_as_x_and_clusters(data):
             "choose from .*vertex_error_mm.mean",
         ),
         ({"tables": [TABLE | {"rows": ["colour"]}]}, "no sample has a label 'colour'; labels there are"),
+        ({"families": ["vertices"]}, "metrics: 'vertices' is none; choose from standard"),
         ({"groups": [{"name": "g", "splits": ["valid"]}]}, "no sample has split 'valid'"),
         ({"groups": [{"name": "g", "unseen": ["design"]}]}, "training splits .train. is there"),
     ],
@@ -216,6 +228,7 @@ PROTOCOL = """
 name = "p"
 title = "P"
 source = "S"
+families = ["vertex"]
 [[metrics]]
 figure = "vertex_error_mm.mean"
 title = "vertex error"

@@ -42,7 +42,7 @@ def test_defaults():
         ("metrics", [], "metrics = "),
         ("colour", "red", "unknown key colour; allowed here are bootstrap, dataset"),
         ("metrics.0.beter", "higher", r"unknown key metrics\.0\.beter; allowed here are better, figure"),
-        ("metrics.0.better", "more", "'lower' or 'higher'"),
+        ("metrics.0.better", "more", "'lower', 'higher' or 'one'"),
         ("select.kind", "drapes", "select.kind = \"drapes\": Input should be 'drape' or 'sequence'"),
         ("select.seen", ["desing"], r"select\.seen\.0 = \"desing\": .*'design'"),
         ("select.where", {"design": "tee"}, r"select\.where\.design = \"tee\""),
@@ -59,6 +59,7 @@ def test_defaults():
         ("figures.0.lines", ["design"], "methods are never pooled"),
         ("bootstrap.confidence", 95, r"bootstrap\.confidence = 95"),
         ("surface_frames", 0, "surface_frames = 0"),
+        ("families", [], "families = "),
     ],
 )
 def test_wrong_values_are_named(path, value, says):
