@@ -136,7 +136,7 @@ def compare(
         points = MaterialPoints(vertices_correspond)
         parts = _seen(pair, points, [_begin(family, pair, surface_frames) for family in families], tell)
         scores.append(_score(pair, parts))
-        notes.update(dict.fromkeys(_remarks(pair, points, parts)))
+        notes.update(list(dict.fromkeys(_remarks(pair, points, parts))))
         for total, part in zip(totals, parts, strict=False):
             total.merge(part)
         totals = totals or parts

@@ -8,9 +8,10 @@ from muslin.eval.score.contact import BodyContact, SelfContact
 from muslin.eval.score.family import Family
 from muslin.eval.score.motion import Motion
 from muslin.eval.score.physics import Change, FabricEnergies, Strain
+from muslin.eval.score.spectra import PanelSpectrum, Spectrum
 from muslin.eval.score.surface import SurfaceDistances
 from muslin.eval.score.vertex import Vertex
-from muslin.eval.score.wrinkles import Curvature, Folds, Normals, Spectrum
+from muslin.eval.score.wrinkles import Curvature, Folds, Normals
 from muslin.garments.errors import InputError
 
 FAMILIES: dict[str, type[Family]] = {
@@ -23,6 +24,7 @@ FAMILIES: dict[str, type[Family]] = {
         Folds,
         Curvature,
         Spectrum,
+        PanelSpectrum,
         Strain,
         Change,
         BodyContact,
