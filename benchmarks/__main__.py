@@ -129,6 +129,58 @@ def wrinkles(
 
 
 @app.command()
+def surface(
+    out: Out = OUT / "surface",
+    peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",
+    presets: Annotated[str, typer.Option(help="Presets of the tee.")] = "long_dress,sweater",
+    vertices: Annotated[int, typer.Option(help="Of the garments, about.")] = 17246,
+    drape: Annotated[Path | None, typer.Option(help="Folder of a simulated sample to add.")] = None,
+    rounds: Rounds = 3,
+    core: Core = 0,
+) -> None:
+    """Hausdorff and mean distance of garments beside PyMeshLab's; write surface.md and surface.json."""
+    from benchmarks import surface as side_by_side
+    from benchmarks.garment_pairs import drape_pair, wrinkled_pairs
+    from benchmarks.surfaces.exchange import Pair
+
+    if (why := side_by_side.PYMESHLAB.missing(peers)) is not None:
+        raise typer.BadParameter(why)
+    pairs: dict[str, Pair] = {}
+    for preset in presets.split(","):
+        pairs |= wrinkled_pairs(preset, vertices)
+    if drape is not None:
+        pairs["drape near"] = drape_pair(drape)
+    results = side_by_side.compare(pairs, peers, out, rounds, core, typer.echo)
+    text = side_by_side.table(results)
+    (out / "surface.md").write_text(f"{machine()}\n\n{text}", encoding="utf-8")
+    _write(out / "surface.json", {name: asdict(result) for name, result in results.items()})
+    typer.echo(text)
+
+
+@app.command()
+def agreement(
+    out: Out = OUT / "agreement",
+    peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",
+    presets: Annotated[str, typer.Option(help="Presets of the tee.")] = "sweater",
+    vertices: Annotated[int, typer.Option(help="Of the garments, about.")] = 17246,
+) -> None:
+    """Surface distances beside those of libigl, trimesh, PyMeshLab and others; write agreement.md."""
+    from benchmarks import agreement as side_by_side
+    from benchmarks.garment_pairs import wrinkled_pairs
+
+    if (why := side_by_side.PEERS.missing(peers)) is not None:
+        raise typer.BadParameter(why)
+    pairs = side_by_side.closed_forms()
+    for preset in presets.split(","):
+        pairs |= wrinkled_pairs(preset, vertices)
+    rows = side_by_side.compare(pairs, peers, out, typer.echo)
+    text = side_by_side.table(rows)
+    (out / "agreement.md").write_text(text, encoding="utf-8")
+    _write(out / "agreement.json", [asdict(row) for row in rows])
+    typer.echo(text)
+
+
+@app.command()
 def reach(
     out: Out = OUT / "reach",
     presets: Annotated[str, typer.Option(help="Presets of the tee.")] = (
