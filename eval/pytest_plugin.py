@@ -10,7 +10,7 @@ def test_walk(muslin_regression, tmp_path):
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -46,6 +46,7 @@ class Regression:
         tolerance: float | None = None,
         tolerances: Mapping[str, float] | None = None,
         fps: float | None = None,
+        metrics: Sequence[str] = ("standard",),
     ) -> None:
         """Fail the test if a figure of prediction against truth is worse than its baseline.
 
@@ -54,6 +55,7 @@ class Regression:
         tolerance    relative, of every error; by default 1%
         tolerances   {path of a figure: relative tolerance}, such as {"vertex_error_mm.mean": 0.05}
         fps          of files that do not tell
+        metrics      families of metrics, as `muslin eval --metrics`
         """
         __tracebackhide__ = True
         from muslin.eval.compare import compare
@@ -71,7 +73,7 @@ class Regression:
         again = f"run pytest {OPTION} to write it"
         if not self._regenerate and not path.is_file():
             pytest.fail(f"{path}: no baseline yet; {again}", pytrace=False)
-        found = measured(compare(prediction, truth, fps=fps).to_dict(), truth)
+        found = measured(compare(prediction, truth, fps=fps, metrics=metrics).to_dict(), truth)
         if self._regenerate:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_baseline(path, found)

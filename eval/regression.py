@@ -98,10 +98,11 @@ def regressions(baseline: Measured, now: Measured, tolerances: Tolerances | None
     not checked. A figure that the baseline has must still exist.
 
     Raises InputError where the two cannot be compared: another truth, another meaning of the metrics, other
-    samples; and for a tolerance of a figure that there is not.
+    samples, figures that were not computed this time; and for a tolerance of a figure that there is not.
     """
     limits = tolerances or Tolerances()
     _check_comparable(baseline, now)
+    _check_computed(baseline, now)
     for path in limits.by_path:
         if not any(_below(figure, path) for figure in (*baseline.figures, *now.figures)):
             raise InputError(f"tolerance of {path!r}: no such figure; choose from {', '.join(now.figures)}")
@@ -190,6 +191,16 @@ def _check_comparable(baseline: Measured, now: Measured) -> None:
             raise InputError(
                 f"the baseline is of {old} {what}, this comparison of {new}: means over different sets; "
                 "predict the same samples, or write the baseline again"
+            )
+
+
+def _check_computed(baseline: Measured, now: Measured) -> None:
+    """A figure that does not exist is null, or its table is; one that is not there was not asked for."""
+    for figure in baseline.figures:
+        if not any(_below(figure, path) or _below(path, figure) for path in now.figures):
+            raise InputError(
+                f"the baseline has {figure}, which was not computed now; give the --metrics that it was made "
+                "with, or write the baseline again"
             )
 
 

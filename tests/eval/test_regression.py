@@ -108,6 +108,14 @@ def test_what_cannot_be_compared_is_refused(change, says):
         regressions(one, replace(one, **change))
 
 
+def test_figures_that_were_not_computed_are_told_from_those_that_do_not_exist():
+    before = figures(velocity_error_mm_s__mean=1.0)
+    (row,) = regressions(before, figures(velocity_error_mm_s=None))
+    assert row.now is None
+    with pytest.raises(InputError, match=r"velocity_error_mm_s\.mean, which was not computed now"):
+        regressions(before, figures(hausdorff_mm=1.0))
+
+
 def test_a_tolerance_of_no_figure_is_refused():
     one = figures(hausdorff_mm=1.0)
     with pytest.raises(InputError, match=r"'hausdorf_mm'.*choose from hausdorff_mm"):

@@ -10,7 +10,7 @@ from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.protocol import load_protocol
 from muslin.eval.bench.run import bench
 from muslin.eval.cost import Cost, write_cost
-from tests.eval.bench.data import predict, predict_files, write_truth
+from tests.eval.bench.data import predict_files, write_truth
 
 PROTOCOLS = Path(__file__).resolve().parents[3] / "scenes" / "protocols"
 DESIGN_MM = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}
@@ -26,7 +26,7 @@ def truth(tmp_path_factory) -> Path:
 def methods(truth) -> dict[str, Path]:
     """steady: too high by 1 to 4 mm by design, 2 mm more on topology t2. shaky: twice as much by design, up
     and down by turns; a sample is lacking."""
-    steady = predict(
+    steady = predict_files(
         truth,
         truth.parent / "steady",
         lambda s, t: 1e-3 * (DESIGN_MM[s.labels["design"]] + 2.0 * (s.labels["topology"] == "t2")),
