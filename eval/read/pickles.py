@@ -12,10 +12,8 @@ Source: Grigorev et al. (2023), "HOOD: Hierarchical Graphs for Generalized Model
 
 from __future__ import annotations
 
-import mmap
-import pickletools
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +21,12 @@ from muslin.eval.read.content import Content, parsing
 from muslin.eval.read.named_arrays import content_of, is_known
 from muslin.garments.errors import InputError
 from muslin.sim.body.pickle_stand_ins import ALLOWED, Array, Function, StandIn
-from muslin.sim.body.smpl_pickle import DAMAGE, ArrayUnpickler, ForbiddenPickleError
+from muslin.sim.body.smpl_pickle import (
+    DAMAGE,
+    ArrayUnpickler,
+    ForbiddenPickleError,
+    check_lengths,
+)
 
 _ARRAYS = {
     key: value
@@ -38,8 +41,6 @@ _PLAIN: dict[tuple[str, str], Any] = {
     ("builtins", "dict"): Function(lambda *_: {}),
 }
 _READ = _ARRAYS | _PLAIN
-
-_MEMO = ("PUT", "BINPUT", "LONG_BINPUT", "GET", "BINGET", "LONG_BINGET")
 
 # A list may name one array many times; beyond this size and so many times the file it is taken for a trap.
 LARGE_BYTES, MOST_REPEATED = 1 << 30, 16
@@ -67,7 +68,7 @@ def read_pickle(path: Path) -> Content:
     """
     try:
         with path.open("rb") as stream:
-            _check_lengths(stream)
+            check_lengths(stream)
             loaded = _Unpickler(stream).load()
     except InputError as error:
         raise type(error)(f"{path}: {error}") from error
@@ -82,17 +83,6 @@ def read_pickle(path: Path) -> Content:
         most = max(LARGE_BYTES, MOST_REPEATED * path.stat().st_size)
         arrays = {name: _array(value, name, most) for name, value in named.items() if is_known(name)}
     return content_of(arrays or dict.fromkeys(named, np.zeros(0)), path)
-
-
-def _check_lengths(stream: IO[bytes]) -> None:
-    """Raise ValueError for a string longer than the file and for a memo larger than it.
-
-    The unpickler would allocate both before it finds the file too short.
-    """
-    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        for opcode, argument, place in pickletools.genops(cast("IO[bytes]", content)):
-            if opcode.name in _MEMO and argument is not None and int(argument) > len(content):
-                raise ValueError(f"memo entry {argument} at byte {place} of {len(content)}")
 
 
 def _array(value: Any, name: str, most_bytes: int) -> np.ndarray:

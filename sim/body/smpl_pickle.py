@@ -7,10 +7,12 @@ anything is called.
 
 from __future__ import annotations
 
+import mmap
 import pickle
+import pickletools
 from collections.abc import Collection
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from muslin.garments.errors import InputError
 from muslin.sim.body.pickle_stand_ins import ALLOWED, resolve
@@ -20,6 +22,8 @@ DAMAGE = (
     pickle.UnpicklingError, EOFError, ValueError, TypeError, AttributeError, LookupError, OverflowError,
     MemoryError, RecursionError,
 )  # fmt: skip
+
+_MEMO = ("PUT", "BINPUT", "LONG_BINPUT", "GET", "BINGET", "LONG_BINGET")
 
 
 class ForbiddenPickleError(InputError):
@@ -43,6 +47,17 @@ class ArrayUnpickler(pickle.Unpickler):
 
     def persistent_load(self, pid: Any) -> Any:
         raise ForbiddenPickleError("the pickle refers to objects outside itself; refused, nothing was run")
+
+
+def check_lengths(stream: IO[bytes]) -> None:
+    """Raise ValueError for a string longer than the file and for a memo larger than it.
+
+    The unpickler would allocate both before it finds the file too short.
+    """
+    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        for opcode, argument, place in pickletools.genops(cast("IO[bytes]", content)):
+            if opcode.name in _MEMO and argument is not None and int(argument) > len(content):
+                raise ValueError(f"memo entry {argument} at byte {place} of {len(content)}")
 
 
 def unpickle_arrays(stream: IO[bytes], label: str, keys: Collection[str] | None = None) -> Any:
@@ -76,6 +91,10 @@ def read_pickle(path: Path, keys: Collection[str]) -> dict[str, Any]:
         InputError: see `unpickle_arrays`; also if the pickle holds no dictionary.
     """
     with path.open("rb") as stream:
+        try:
+            check_lengths(stream)
+        except DAMAGE as error:
+            raise InputError(f"{path}: no readable SMPL pickle ({error}); give an intact file") from error
         content = unpickle_arrays(stream, str(path), keys)
     if not isinstance(content, dict):
         raise InputError(

@@ -227,3 +227,16 @@ def test_random_damage_gives_one_error_or_data() -> None:
             damaged[position] = generator.integers(0, 256)
         with contextlib.suppress(InputError):
             read(bytes(damaged))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\x80\x04\x8d" + (1 << 40).to_bytes(8, "little") + b"short.",  # a string of 1 TB
+        b"\x80\x02}r" + (1 << 31).to_bytes(4, "little") + b".",  # entry 2^31 of the memo
+    ],
+)
+def test_lengths_beyond_the_file_are_refused_before_anything_is_allocated(tmp_path, content):
+    (tmp_path / "body.pkl").write_bytes(content)
+    with pytest.raises(InputError, match="no readable SMPL pickle"):
+        read_pickle(tmp_path / "body.pkl", ["v_template"])
