@@ -43,11 +43,12 @@ class Pane {
     const { looks, body, shades } = player;
     surface.show(player.frame, player.high);
     const group = new THREE.Group();
+    const view = player.view(this.aspect);
     const heat = looks.heat && surface.track.levels;
     group.add(surface.mesh(heat ? shades.heat : shades.cloth));
-    if (looks.lines) group.add(surface.lines(shades.lines));
+    if (looks.lines) group.add(surface.lines(shades.lines, view.eye));
     if (body && looks.body) group.add(body.mesh(shades.body));
-    stage.draw(this.canvas, group, player.view(this.aspect));
+    stage.draw(this.canvas, group, view);
   }
 
   // Shows the value at a place of the picture, x right and y down in [0, 1]; null hides it.

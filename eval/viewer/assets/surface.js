@@ -1,5 +1,7 @@
 // A moving surface in three.js: shaded cloth or heat map, its triangles' sides, and rays against it.
 
+const NEARER = 0.001;
+
 // Vertex normals, the sum of the triangles' normals by area.
 function computeNormals(positions, faces, normals) {
   normals.fill(0);
@@ -56,15 +58,13 @@ function heatTexture(stops) {
 }
 
 function materials(stops) {
-  const common = { side: THREE.DoubleSide, shadowSide: THREE.DoubleSide, polygonOffset: true,
-    polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+  const common = { side: THREE.DoubleSide, shadowSide: THREE.DoubleSide };
   const map = heatTexture(stops);
   return {
     cloth: new THREE.MeshLambertMaterial({ ...common, color: CLOTH }),
     // More than half of its light is its own, so that a fold's shade does not pass for another colour of the bar.
     heat: new THREE.MeshLambertMaterial({ ...common, color: 0xb0b0b0, map, emissive: 0xc2c2c2, emissiveMap: map }),
-    body: new THREE.MeshLambertMaterial({ color: BODY, polygonOffset: true, polygonOffsetFactor: 2,
-      polygonOffsetUnits: 2 }),
+    body: new THREE.MeshLambertMaterial({ color: BODY }),
     lines: new THREE.LineBasicMaterial({ color: LINES, transparent: true, opacity: 0.42 }),
   };
 }
@@ -116,7 +116,9 @@ class Surface {
     return mesh;
   }
 
-  lines(material) {
+  // The triangles' sides, brought nearer to the eye along the rays by a thousandth, so that they do not sink into
+  // the cloth. (An offset of the cloth's own depth would let the body show through where the cloth is seen edge on.)
+  lines(material, eye) {
     if (!this.edges) {
       this.edges = new THREE.BufferGeometry();
       this.edges.setAttribute("position", this.geometry.attributes.position);
@@ -125,6 +127,8 @@ class Surface {
     }
     const lines = new THREE.LineSegments(this.edges, material);
     lines.frustumCulled = false;
+    lines.scale.setScalar(1 - NEARER);
+    lines.position.copy(eye).multiplyScalar(NEARER);
     return lines;
   }
 
