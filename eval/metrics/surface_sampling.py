@@ -137,14 +137,17 @@ class _Side:
         self.largest, self.rounds, self.count = 0.0, 0, 0
 
     def add(self, count: int) -> None:
-        """`count` points more of every shift."""
+        """`count` points more of every shift, asked for in one order over the surface: near ones one after
+        another are faster."""
         mesh = self.source
-        for shift in range(SHIFTS):
-            seed = [*self.seed, self.rounds, shift]
-            distance = self.target.closest(_spread(mesh.vertices, mesh.faces, mesh.areas, count, seed))[0]
-            self.sums[shift] += distance.sum()
-            self.squares[shift] += np.square(distance).sum()
-            self.largest = max(self.largest, float(distance.max()))
+        points = [
+            _spread(mesh.vertices, mesh.faces, mesh.areas, count, [*self.seed, self.rounds, shift])
+            for shift in range(SHIFTS)
+        ]
+        distance = self.target.closest(np.stack(points, axis=1).reshape(-1, 3))[0].reshape(count, SHIFTS)
+        self.sums += distance.sum(axis=0)
+        self.squares += np.square(distance).sum(axis=0)
+        self.largest = max(self.largest, float(distance.max()))
         self.rounds, self.count = self.rounds + 1, self.count + count
 
 
