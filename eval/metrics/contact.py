@@ -229,8 +229,8 @@ def _inside_doubtful(
     normal = np.cross(b - a, c - a)
     normal *= nudge / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     both = np.concatenate([samples.points + normal, samples.points - normal])
-    inside = winding_numbers(both, body, body_faces).reshape(2, -1) > 0
-    return samples.where(inside.all(axis=0))
+    above, below = winding_numbers(both, body, body_faces).reshape(2, -1) > 0
+    return samples.where(above & below)
 
 
 def _inside_open(
