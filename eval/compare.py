@@ -18,10 +18,10 @@ from muslin.eval.score.families import chosen
 from muslin.eval.score.family import Family, as_json
 from muslin.eval.score.frame import UnavailableError, frames_of
 from muslin.eval.score.motion import ONE_FRAME
-from muslin.eval.score.surface import FRAMES, SurfaceDistances
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.sample import Sample
 
+SURFACE_FRAMES = 24
 BY_PANEL_SPACE = (
     "where topologies differ, errors at vertices, edges and faces are those of the truth's against points of "
     "the prediction with the same panel-space coordinates"
@@ -89,7 +89,7 @@ def compare(
     *,
     fps: float | None = None,
     metrics: Sequence[str] = ("standard",),
-    surface_frames: int = FRAMES,
+    surface_frames: int = SURFACE_FRAMES,
     progress: Progress | None = None,
     prediction_options: ReadOptions | None = None,
     truth_options: ReadOptions | None = None,
@@ -107,7 +107,7 @@ def compare(
 
     fps                   frames per second of folders of meshes; None leaves derivatives over time out
     metrics               names of families, `muslin.eval.score.families`; "standard" or "all" for several
-    surface_frames        most frames of a sequence that get surface distances, evenly spread (they cost most)
+    surface_frames        most frames of a sequence that get surface distances, which cost most, evenly spread
     prediction_options    how files of the prediction are read (fps then stands there), and
     truth_options         those of the truth
     vertices_correspond   vertex k is the same point on both sides wherever the vertex counts agree, although
@@ -134,7 +134,7 @@ def compare(
         pair = paired(first.load(a), second.load(b))
         _check_rates(pair)
         points = MaterialPoints(vertices_correspond)
-        parts = _seen(pair, points, [_begin(family, pair, surface_frames) for family in families], tell)
+        parts = _seen(pair, points, [family(pair) for family in families], surface_frames, tell)
         scores.append(_score(pair, parts))
         notes.update(list(dict.fromkeys(_remarks(pair, points, parts))))
         for total, part in zip(totals, parts, strict=False):
@@ -155,18 +155,16 @@ def compare(
     )
 
 
-def _begin(family: type[Family], pair: Pair, surface_frames: int) -> Family:
-    if issubclass(family, SurfaceDistances):
-        return family(pair, surface_frames)
-    return family(pair)
-
-
 def _seen(
-    pair: Pair, points: MaterialPoints, parts: list[Family], tell: Callable[[float], None]
+    pair: Pair,
+    points: MaterialPoints,
+    parts: list[Family],
+    most_chosen: int,
+    tell: Callable[[float], None],
 ) -> list[Family]:
     """The families after all frames of a pair; new ones in place of those that lack something."""
     lacking: dict[Family, str] = {}
-    for frame in frames_of(pair, points):
+    for frame in frames_of(pair, points, most_chosen):
         tell(frame.t / pair.truth.num_frames)
         for part in parts:
             if part not in lacking:

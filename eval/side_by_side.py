@@ -10,6 +10,7 @@ from muslin.eval.metrics.surface_sampling import point_to_surface
 from muslin.eval.metrics.vertex import vertex_errors
 from muslin.eval.read.track import Track
 from muslin.eval.viewer.scene import MovingMesh, Scene
+from muslin.sim.view.picture import AZIMUTH, facing
 
 MM = 1000.0
 TRUTH = "truth"
@@ -28,7 +29,8 @@ def side_by_side(name: str, truth: Track, predictions: Mapping[str, Track]) -> S
         faces = track.faces or truth.faces
         sides[key] = MovingMesh(track.positions, faces, _errors(track, truth, same))
     measure = "vertex error" if same else "distance to the truth's surface"
-    return Scene(f"{name} ({measure})", sides, fps=truth.fps, body=_body(truth))
+    azimuth = AZIMUTH + (0.0 if truth.sample is None else facing(truth.sample, 0))
+    return Scene(f"{name} ({measure})", sides, fps=truth.fps, body=_body(truth), azimuth=azimuth)
 
 
 def _corresponds(prediction: Track, truth: Track) -> bool:

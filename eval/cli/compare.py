@@ -56,7 +56,8 @@ def evaluate(
             "--metrics",
             metavar="NAME",
             help="Families of metrics, repeatable: standard, all, vertex, motion, surface, normals, folds, "
-            "curvature, spectrum, panel-spectrum, strain, change, body-contact, self-contact, energy.",
+            "curvature, spectrum, panel-spectrum, strain, change, body-contact, self-contact, definitions, "
+            "energy.",
         ),
     ] = None,
     baseline: Annotated[

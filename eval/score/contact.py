@@ -13,11 +13,14 @@ from muslin.eval.metrics.contact_summary import (
     SelfContactSummary,
 )
 from muslin.eval.metrics.penetration import PSEUDONORMAL
+from muslin.eval.metrics.penetration_definitions import penetration_definitions
 from muslin.eval.read.pairing import Pair
-from muslin.eval.score.family import MM, Family
+from muslin.eval.score.family import MM, Family, PairMeans
 from muslin.eval.score.frame import PairFrame, UnavailableError
 
 LITRES = 1000.0
+NO_BODY = "neither side comes with a body"
+SOME_FRAMES = "penetration by other definitions of some frames of a sequence only, evenly spread"
 OPEN_BODY = (
     "the body is not closed, so what is inside is told by the direction of its nearest normal, and areas by "
     "samples"
@@ -35,7 +38,7 @@ class BodyContact(Family):
 
     def update(self, frame: PairFrame) -> None:
         if frame.body is None or frame.pair.body is None:
-            raise UnavailableError("neither side comes with a body")
+            raise UnavailableError(NO_BODY)
         masked = _masked(frame)
         cloths = {
             "prediction": (frame.predicted, frame.predicted_faces),
@@ -93,6 +96,32 @@ class SelfContact(Family):
 
     def frames(self) -> dict[str, list[Any]]:
         return {"self_pairs": [frame.pairs for frame in self.sides["prediction"].own]}
+
+
+class Definitions(Family):
+    """Penetration of the prediction as others define it, for comparison with papers; of the chosen frames."""
+
+    name, what = "definitions", "other definitions of penetration are"
+
+    def __init__(self, pair: Pair) -> None:
+        super().__init__(pair)
+        self.means = PairMeans()
+
+    def update(self, frame: PairFrame) -> None:
+        if frame.body is None or frame.pair.body is None:
+            raise UnavailableError(NO_BODY)
+        if not frame.chosen:
+            self.notes = [SOME_FRAMES]
+            return
+        cloth, body = (frame.predicted, frame.predicted_faces), (frame.body, frame.pair.body.faces)
+        self.means.add(**penetration_definitions(*cloth, *body).to_dict())
+
+    def merge(self, other: Self) -> None:
+        self.means.merge(other.means)
+
+    def figures(self) -> dict[str, Any]:
+        found = {name: self.means.mean(name) for name in self.means.values}
+        return {"penetration_definitions": found or None}
 
 
 def _masked(frame: PairFrame) -> np.ndarray | None:

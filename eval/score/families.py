@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from muslin.eval.score.contact import BodyContact, SelfContact
+from muslin.eval.score.contact import BodyContact, Definitions, SelfContact
 from muslin.eval.score.family import Family
 from muslin.eval.score.motion import Motion
 from muslin.eval.score.physics import Change, FabricEnergies, Strain
@@ -29,12 +29,14 @@ FAMILIES: dict[str, type[Family]] = {
         Change,
         BodyContact,
         SelfContact,
+        Definitions,
         FabricEnergies,
     )
 }
 
-STANDARD = tuple(name for name in FAMILIES if name != FabricEnergies.name)
-"""What is computed unless told otherwise: all but energies, for which the simulator's kernels are loaded."""
+STANDARD = tuple(name for name in FAMILIES if name not in (Definitions.name, FabricEnergies.name))
+"""What is computed unless told otherwise: not energies, for which the simulator's kernels are loaded, and not
+other definitions of penetration, which cost more than all the rest of a frame."""
 
 
 def chosen(names: Sequence[str]) -> tuple[type[Family], ...]:

@@ -26,11 +26,14 @@ class PairFrame:
 
     predicted, true               (V, 3) positions of both sides, metres
     predicted_faces, true_faces   (F, 3)
+    chosen                        whether it is one of the frames that get costly figures
     """
 
-    def __init__(self, pair: Pair, t: int, points: MaterialPoints, earlier: Sequence[PairFrame]) -> None:
+    def __init__(
+        self, pair: Pair, t: int, points: MaterialPoints, earlier: Sequence[PairFrame], chosen: bool
+    ) -> None:
         """earlier   the frames just before this one, at most `MOST_EARLIER`"""
-        self.pair, self.t, self.points, self._earlier = pair, t, points, tuple(earlier)
+        self.pair, self.t, self.points, self._earlier, self.chosen = pair, t, points, tuple(earlier), chosen
         self.predicted, self.true = pair.prediction.positions[t], pair.truth.positions[t]
         self.predicted_faces, self.true_faces = pair.prediction.faces[t], pair.truth.faces[t]
 
@@ -90,11 +93,13 @@ class PairFrame:
         return predicted, true
 
 
-def frames_of(pair: Pair, points: MaterialPoints) -> Iterator[PairFrame]:
-    """All frames of a pair in order; each is read once."""
+def frames_of(pair: Pair, points: MaterialPoints, most_chosen: int) -> Iterator[PairFrame]:
+    """All frames of a pair in order, each read once; `most_chosen` of them at most are chosen, evenly spread."""
+    count = pair.truth.num_frames
+    chosen = set(np.linspace(0, count - 1, min(count, most_chosen)).round().astype(int).tolist())
     last: deque[PairFrame] = deque(maxlen=MOST_EARLIER)
-    for t in range(pair.truth.num_frames):
-        frame = PairFrame(pair, t, points, last)
+    for t in range(count):
+        frame = PairFrame(pair, t, points, last, t in chosen)
         yield frame
         frame.forget()
         last.append(frame)

@@ -12,34 +12,29 @@ from muslin.eval.read.pairing import Pair
 from muslin.eval.score.family import MM, Family
 from muslin.eval.score.frame import PairFrame
 
-FRAMES = 24
-"""Most frames of a sequence that are measured, unless told otherwise."""
+SOME_FRAMES = "surface distances of some frames of a sequence only, evenly spread (--surface-frames)"
 
 
 class SurfaceDistances(Family):
-    """Hausdorff distance with its bounds, mean and rms distance; of some frames, evenly spread."""
+    """Hausdorff distance with its bounds, mean and rms distance; of the chosen frames."""
 
     name, what = "surface", "surface distances are"
 
-    def __init__(self, pair: Pair, most_frames: int = FRAMES) -> None:
+    def __init__(self, pair: Pair) -> None:
         super().__init__(pair)
-        count = pair.truth.num_frames
-        chosen = np.unique(np.linspace(0, count - 1, min(count, most_frames)).round().astype(int))
-        self.chosen = [int(t) for t in chosen]
-        if len(self.chosen) < count:
-            self.notes.append(
-                f"surface distances of {len(self.chosen)} of {count} frames of a sequence, evenly spread"
-            )
+        self.chosen: list[int] = []
         self.lower: list[float] = []
         self.upper: list[float] = []
         self.mean: list[float] = []
         self.rms: list[float] = []
 
     def update(self, frame: PairFrame) -> None:
-        if frame.t not in self.chosen:
+        if not frame.chosen:
+            self.notes = [SOME_FRAMES]
             return
         sides = (frame.predicted, frame.predicted_faces, frame.true, frame.true_faces)
         bounds, distance = hausdorff(*sides), surface_distance(*sides)
+        self.chosen.append(frame.t)
         self.lower.append(bounds.lower)
         self.upper.append(bounds.upper)
         self.mean.append(distance.mean)

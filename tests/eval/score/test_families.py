@@ -98,6 +98,13 @@ def test_a_sheet_through_the_ball_crosses_it_along_a_circle(score, make_sample):
     assert found["truth_body_intersections"]["pairs_max"] == 0
 
 
+def test_definitions_of_penetration_differ(score, make_sample):
+    truth, close = make_sample("a", n=61), make_sample("a", n=61, height=0.2005)
+    found = score(truth, close, metrics=["definitions", "body-contact"]).figures
+    assert found["penetration"]["ratio"] == found["penetration_definitions"]["signed_distance"] == 0.0
+    assert found["penetration_definitions"]["face_centre"] > 0.0
+
+
 def test_a_sheet_folded_through_itself_crosses_itself(score, make_sample):
     truth = make_sample("a", n=9, height=0.5)
 
@@ -155,7 +162,7 @@ def test_what_some_samples_lack_is_counted(score, make_sample):
 
 
 def test_names_of_families():
-    assert set(STANDARD) == set(FAMILIES) - {"energy"}
+    assert set(STANDARD) == set(FAMILIES) - {"energy", "definitions"}
     assert [family.name for family in chosen(["change", "vertex"])] == ["vertex", "change"]
     assert len(chosen(["all"])) == len(FAMILIES)
     for wrong in (["speed"], []):
