@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from muslin.eval.bench.curves import plots
 from muslin.eval.bench.draw import plot_svg
+from muslin.eval.bench.findings import Findings
 from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.scenes import scenes
-from muslin.eval.bench.tables import BLANK, Filled, duels, fill
+from muslin.eval.bench.tables import BLANK, Filled
 from muslin.eval.bench.write import DUEL_HEADS, cell_text, duel_row
 from muslin.eval.cost import Cost
 from muslin.eval.page import column, duration, number, render_page, tile
@@ -19,11 +19,10 @@ from muslin.eval.viewer.page import viewer
 NAMED = 12  # most samples that a note names
 
 
-def bench_report(outcome: Outcome) -> str:
+def bench_report(outcome: Outcome, found: Findings) -> str:
     """HTML: who was scored on how much, tables, figures, methods against each other, a player of samples."""
     protocol = outcome.protocol
     compared, scored = len(outcome.common(list(outcome.entries))), len(outcome.entries)
-    drawn = [plot for figure in protocol.figures for plot in plots(outcome, figure)]
     return render_page(
         "bench.html.j2",
         title=f"muslin: {protocol.title}",
@@ -39,11 +38,11 @@ def bench_report(outcome: Outcome) -> str:
         notes=_notes(outcome),
         method_columns=_method_columns(outcome),
         method_rows=[_method_row(outcome, name) for name in outcome.methods],
-        tables=[_table(fill(outcome, table)) for table in protocol.tables],
+        tables=[_table(table) for table in found.tables],
         interval=f"{100 * protocol.bootstrap.confidence:g}%",
-        plots=[{"svg": plot_svg(plot), "caption": plot.title} for plot in drawn],
+        plots=[{"svg": plot_svg(plot), "caption": plot.title} for plot in found.plots],
         duel_columns=[column(name, text=k < 3) for k, name in enumerate(DUEL_HEADS)],
-        duel_rows=[duel_row(duel) for duel in duels(outcome)],
+        duel_rows=[duel_row(duel) for duel in found.duels],
         viewer=viewer(scenes(outcome)),
         origin=_origin(outcome.origin),
     )

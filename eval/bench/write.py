@@ -11,29 +11,27 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from muslin.eval.bench.curves import Plot, long_points, plot_dict, plots
+from muslin.eval.bench.curves import long_points, plot_dict
 from muslin.eval.bench.draw import plot_png, plot_svg_file
+from muslin.eval.bench.findings import Findings
 from muslin.eval.bench.outcome import Outcome
-from muslin.eval.bench.tables import Cell, Duel, Filled, duel_dict, duels, fill, interval_text, long_rows
+from muslin.eval.bench.tables import Cell, Duel, Filled, duel_dict, interval_text, long_rows
 from muslin.eval.page import write_atomically
 
 FORMAT, FORMAT_VERSION = "muslin benchmark", 1
 PLACES = ("x", "mean", "low", "high", "samples", "of")
 
 
-def write_outcome(outcome: Outcome, folder: Path) -> list[Path]:
+def write_outcome(outcome: Outcome, found: Findings, folder: Path) -> list[Path]:
     """Write results.json, tables/*.md and *.csv, figures/*.svg, *.png and *.csv; returns what was written."""
-    tables = [fill(outcome, table) for table in outcome.protocol.tables]
-    drawn = [plot for figure in outcome.protocol.figures for plot in plots(outcome, figure)]
-    against = duels(outcome)
-    files: dict[Path, bytes] = {folder / "results.json": results_json(outcome, tables, drawn, against)}
-    for name, table in zip(_file_names([table.title for table in tables]), tables, strict=True):
+    files: dict[Path, bytes] = {folder / "results.json": results_json(outcome, found)}
+    for name, table in zip(_file_names([table.title for table in found.tables]), found.tables, strict=True):
         files[folder / "tables" / f"{name}.md"] = markdown(table).encode()
         files[folder / "tables" / f"{name}.csv"] = csv_bytes(long_rows(table))
-    if against:
-        files[folder / "tables" / "paired.md"] = duels_markdown(against).encode()
-        files[folder / "tables" / "paired.csv"] = csv_bytes([duel_dict(duel) for duel in against])
-    for name, plot in zip(_file_names([plot.title for plot in drawn]), drawn, strict=True):
+    if found.duels:
+        files[folder / "tables" / "paired.md"] = duels_markdown(found.duels).encode()
+        files[folder / "tables" / "paired.csv"] = csv_bytes([duel_dict(duel) for duel in found.duels])
+    for name, plot in zip(_file_names([plot.title for plot in found.plots]), found.plots, strict=True):
         files[folder / "figures" / f"{name}.svg"] = plot_svg_file(plot)
         files[folder / "figures" / f"{name}.png"] = plot_png(plot)
         files[folder / "figures" / f"{name}.csv"] = csv_bytes(long_points(plot))
@@ -43,9 +41,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> list[Path]:
     return list(files)
 
 
-def results_json(
-    outcome: Outcome, tables: Sequence[Filled], drawn: Sequence[Plot], against: Sequence[Duel]
-) -> bytes:
+def results_json(outcome: Outcome, found: Findings) -> bytes:
     """Everything that was found, each sample's figures of each method too."""
     values = {
         "format": FORMAT,
@@ -58,9 +54,9 @@ def results_json(
         "groups": {
             name: {"samples": ids, "compared": outcome.common(ids)} for name, ids in outcome.groups.items()
         },
-        "tables": [{"title": table.title, "cells": long_rows(table)} for table in tables],
-        "paired": [duel_dict(duel) for duel in against],
-        "figures": [plot_dict(plot) for plot in drawn],
+        "tables": [{"title": table.title, "cells": long_rows(table)} for table in found.tables],
+        "paired": [duel_dict(duel) for duel in found.duels],
+        "figures": [plot_dict(plot) for plot in found.plots],
         "samples": [_sample(outcome, i) for i in outcome.entries],
     }
     return (json.dumps(values, indent=1, allow_nan=False) + "\n").encode()

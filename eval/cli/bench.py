@@ -10,6 +10,7 @@ import typer
 from muslin.eval.cli.options import Workers, check_place
 
 if TYPE_CHECKING:
+    from muslin.eval.bench.findings import Findings
     from muslin.eval.bench.outcome import Outcome
 
 
@@ -48,15 +49,17 @@ def bench(
     if out is not None:
         check_place(out)
 
+    from muslin.eval.bench.findings import findings
     from muslin.eval.bench.run import bench as run
     from muslin.eval.cli.progress import progress_bar
 
     with progress_bar("bench") as update:
         outcome = run(loaded, given, dataset, workers=workers, progress=update)
-    for line in _summary(outcome):
+    found = findings(outcome)
+    for line in _summary(outcome, found):
         typer.echo(line)
     if out is not None:
-        _write(outcome, out)
+        _write(outcome, found, out)
     refused = {name: why for name in outcome.methods if (why := outcome.refused(name))}
     for name, reasons in refused.items():
         for sample, reason in reasons.items():
@@ -67,13 +70,12 @@ def bench(
         raise typer.Exit(1)
 
 
-def _summary(outcome: Outcome) -> list[str]:
-    from muslin.eval.bench.tables import duels, fill
+def _summary(outcome: Outcome, found: Findings) -> list[str]:
     from muslin.eval.bench.write import duels_markdown, markdown
 
-    parts = [markdown(fill(outcome, table)) for table in outcome.protocol.tables]
-    if against := duels(outcome):
-        parts.append(duels_markdown(against))
+    parts = [markdown(table) for table in found.tables]
+    if found.duels:
+        parts.append(duels_markdown(found.duels))
     for name in outcome.methods:
         if missing := outcome.missing(name):
             some = ", ".join(missing[:4]) + (" …" if len(missing) > 4 else "")
@@ -81,12 +83,12 @@ def _summary(outcome: Outcome) -> list[str]:
     return parts
 
 
-def _write(outcome: Outcome, out: Path) -> None:
+def _write(outcome: Outcome, found: Findings, out: Path) -> None:
     from muslin.eval.bench.report import bench_report
     from muslin.eval.bench.write import write_outcome
     from muslin.eval.page import write_atomically
 
     out.mkdir(parents=True, exist_ok=True)
-    write_outcome(outcome, out)
-    write_atomically(out / "report.html", bench_report(outcome).encode())
+    write_outcome(outcome, found, out)
+    write_atomically(out / "report.html", bench_report(outcome, found).encode())
     typer.echo(str(out / "report.html"))

@@ -6,10 +6,12 @@ import json
 import pytest
 
 from muslin.eval.bench.curves import plots
+from muslin.eval.bench.findings import findings
 from muslin.eval.bench.protocol import load_protocol
 from muslin.eval.bench.report import bench_report
 from muslin.eval.bench.tables import duels, fill
 from muslin.eval.bench.write import write_outcome
+from tests.browser import browser
 from tests.eval.bench.conftest import LEFT_OUT, PROTOCOLS
 from tests.eval.bench.data import FPS, FRAMES
 
@@ -115,7 +117,9 @@ def test_errors_over_frames(outcomes):
 
 def test_files_for_papers(outcomes, tmp_path):
     outcome = outcomes[DESIGNS]
-    written = {path.relative_to(tmp_path).as_posix() for path in write_outcome(outcome, tmp_path)}
+    written = {
+        path.relative_to(tmp_path).as_posix() for path in write_outcome(outcome, findings(outcome), tmp_path)
+    }
     assert "results.json" in written
     assert "tables/unseen-designs.md" in written
     assert "figures/hausdorff-distance-against-body-shape-c.svg" in written
@@ -137,7 +141,7 @@ def test_files_for_papers(outcomes, tmp_path):
 
 def test_results_tell_where_they_are_from(outcomes, tmp_path):
     outcome = outcomes[DESIGNS]
-    write_outcome(outcome, tmp_path)
+    write_outcome(outcome, findings(outcome), tmp_path)
     values = json.loads((tmp_path / "results.json").read_text())
     assert values["origin"]["protocol"] == load_protocol(PROTOCOLS / f"{DESIGNS}.toml").hash
     assert len(values["origin"]["dataset"]) == 64
@@ -153,7 +157,7 @@ def test_results_tell_where_they_are_from(outcomes, tmp_path):
 
 
 def test_page_shows_everything_and_needs_nothing(outcomes):
-    page = bench_report(outcomes[DESIGNS])
+    page = bench_report(outcomes[DESIGNS], findings(outcomes[DESIGNS]))
     assert "shaky lacks 1 samples: c-s2-t0" in page
     assert "2 of 3" in page
     for cost in ("12.5", "7,100,000", "14.2"):
@@ -164,3 +168,26 @@ def test_page_shows_everything_and_needs_nothing(outcomes):
         assert f"unseen designs, {what}" in page
     for outside in ('src="http', 'href="http', "@import", "url(http"):
         assert outside not in page
+
+
+def test_page_plays_sequences_of_both_methods_in_a_browser(outcomes, tmp_path):
+    outcome = outcomes[ANIMATED]
+    (tmp_path / "report.html").write_text(bench_report(outcome, findings(outcome)), encoding="utf-8")
+    with browser(tmp_path / "profile", viewport={"width": 760, "height": 620}) as opened:
+        page, wrong = opened.new_page(), []
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("requestfailed", lambda request: wrong.append(request.url))
+        page.goto((tmp_path / "report.html").as_uri())
+        page.locator(".muslin-viewer").scroll_into_view_if_needed()  # it starts when it is seen
+        page.wait_for_function("document.querySelectorAll('.muslin-viewer canvas').length >= 3")
+        text = page.inner_text("body")
+    assert not wrong
+    # Two samples, so that a worst and a best are told apart and nothing is between them.
+    for words in (
+        "unseen designs, held-out sequences",
+        "truth",
+        "steady",
+        "shaky",
+        "Velocity error over frames: c",
+    ):
+        assert words in text
