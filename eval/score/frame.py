@@ -94,7 +94,7 @@ class PairFrame:
 
 
 def frames_of(pair: Pair, points: MaterialPoints, most_chosen: int) -> Iterator[PairFrame]:
-    """All frames of a pair in order, each read once; `most_chosen` of them at most are chosen, evenly spread."""
+    """All frames of a pair in order, each read once; at most `most_chosen` are chosen, evenly spread."""
     count = pair.truth.num_frames
     chosen = set(np.linspace(0, count - 1, min(count, most_chosen)).round().astype(int).tolist())
     last: deque[PairFrame] = deque(maxlen=MOST_EARLIER)
