@@ -6,8 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from muslin.eval.metrics.hausdorff import hausdorff
-from muslin.eval.metrics.surface_sampling import surface_distance
+from muslin.eval.metrics.surface_pair import compare_surfaces
 from muslin.eval.read.pairing import Pair
 from muslin.eval.score.family import MM, Family
 from muslin.eval.score.frame import PairFrame
@@ -33,7 +32,8 @@ class SurfaceDistances(Family):
             self.notes = [SOME_FRAMES]
             return
         sides = (frame.predicted, frame.predicted_faces, frame.true, frame.true_faces)
-        bounds, distance = hausdorff(*sides), surface_distance(*sides)
+        found = compare_surfaces(*sides)
+        bounds, distance = found.hausdorff, found.distance
         self.chosen.append(frame.t)
         self.lower.append(bounds.lower)
         self.upper.append(bounds.upper)
