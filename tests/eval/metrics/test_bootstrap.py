@@ -60,6 +60,26 @@ def test_agrees_with_scipy_where_samples_are_many():
     assert ours.high == pytest.approx(theirs.confidence_interval.high, abs=0.06 * width)
 
 
+@pytest.mark.parametrize("clusters", [None, [0, 0, 1, 2, 2, 2, 3, 4, 5, 6, 6, 7]])
+def test_agrees_with_the_formula_written_out(clusters):
+    x = np.random.default_rng(9).exponential(size=12) ** 2
+    groups = (
+        [x[[k]] for k in range(12)] if clusters is None else [x[np.array(clusters) == k] for k in range(8)]
+    )
+    n, m = len(groups), x.mean()
+    drawn = np.random.default_rng(3).integers(0, n, (3000, n))
+    means = np.array([np.concatenate([groups[k] for k in row]).mean() for row in drawn])
+    without = np.array([np.concatenate(groups[:k] + groups[k + 1 :]).mean() for k in range(n)])
+    d = without.mean() - without
+    a = (d**3).sum() / (6 * (d**2).sum() ** 1.5)
+    equal = np.isclose(means, m, rtol=1e-12)  # every group once
+    z0 = stats.norm.ppf(((means < m) & ~equal).mean() + 0.5 * equal.mean())
+    z = np.sqrt(n / (n - 1)) * stats.t.ppf([0.025, 0.975], n - 1)
+    shares = stats.norm.cdf(z0 + (z0 + z) / (1 - a * (z0 + z)))
+    found = mean_interval(x, clusters, resamples=3000, seed=3)
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(means, shares)))
+
+
 @given(st.lists(numbers, min_size=5, max_size=12), st.floats(0.1, 50), st.floats(-100, 100))
 def test_interval_holds_its_mean_and_moves_with_the_values(values, scale, shift):
     x = np.array(values)
