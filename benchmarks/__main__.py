@@ -129,6 +129,22 @@ def wrinkles(
 
 
 @app.command()
+def standard(
+    source: Annotated[Path, typer.Argument(help="A dataset; its first long enough sequence is taken.")],
+    out: Out = OUT / "standard",
+    frames: Annotated[int, typer.Option(help="Of the sequence.", min=4)] = 120,
+    rounds: Rounds = 3,
+) -> None:
+    """What all standard metrics of `muslin eval` cost on a sequence; write standard.md."""
+    from benchmarks.standard import costs
+
+    text = costs(source, frames, rounds).table()
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "standard.md").write_text(text, encoding="utf-8")
+    typer.echo(text)
+
+
+@app.command()
 def surface(
     out: Out = OUT / "surface",
     peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",
