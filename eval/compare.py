@@ -11,6 +11,7 @@ from typing import Any
 
 from muslin.eval.cost import Cost, read_cost
 from muslin.eval.material_points import MaterialPoints
+from muslin.eval.provenance import provenance
 from muslin.eval.read.options import ReadOptions
 from muslin.eval.read.pairing import Pair, paired
 from muslin.eval.read.subject import Subject, matched, open_subject
@@ -55,6 +56,7 @@ class Comparison:
     """Figures over all pairs, each pair's own, and what could not be compared.
 
     subjects   prediction and truth, opened as they were for the figures
+    origin     of `muslin.eval.provenance`: what the figures were computed from and by
     """
 
     prediction: str
@@ -66,6 +68,7 @@ class Comparison:
     unmatched_truth: list[str]
     notes: list[str]
     subjects: tuple[Subject, Subject]
+    origin: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -73,6 +76,7 @@ class Comparison:
             "truth": self.truth,
             "samples": len(self.pairs),
             "frames": self.frames,
+            "origin": self.origin,
             **self.figures,
             "notes": self.notes,
             "unmatched": {"prediction": self.unmatched_prediction, "truth": self.unmatched_truth},
@@ -152,6 +156,7 @@ def compare(
         unmatched_truth=left_second,
         notes=_counted(notes, len(pairs)),
         subjects=(first, second),
+        origin=provenance(truth),
     )
 
 

@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from muslin.eval.bench.outcome import Outcome
-from muslin.eval.metrics.surface_sampling import point_to_surface
-from muslin.eval.metrics.vertex import vertex_errors
 from muslin.eval.read.subject import open_subject
-from muslin.eval.read.track import Track
-from muslin.eval.viewer.scene import MovingMesh, Scene
+from muslin.eval.side_by_side import side_by_side
+from muslin.eval.viewer.scene import Scene
 from muslin.sim.dataset import store
-
-MM = 1000.0
-TRUTH = "truth"
 
 
 def scenes(outcome: Outcome) -> list[Scene]:
@@ -50,40 +43,4 @@ def _scene(outcome: Outcome, sample: str, name: str) -> Scene:
     for key, method in outcome.methods.items():
         subject = open_subject(method.predictions[sample], None if method.is_dataset else truth.fps)
         predictions[key] = subject.load(subject.ids[0])
-    same = all(_corresponds(track, truth) for track in predictions.values())
-    sides = {TRUTH: MovingMesh(truth.positions, truth.faces)}
-    for key, track in predictions.items():
-        # A file may hold vertices alone; it was scored with the truth's triangles.
-        faces = track.faces or truth.faces
-        sides[key] = MovingMesh(track.positions, faces, _errors(track, truth, same))
-    measure = "vertex error" if same else "distance to the truth's surface"
-    return Scene(
-        f"{name} ({measure})",
-        sides,
-        fps=truth.fps,
-        body=_body(truth),
-    )
-
-
-def _corresponds(prediction: Track, truth: Track) -> bool:
-    """Whether both have the same vertices in every frame."""
-    return all(
-        len(prediction.positions[t]) == len(truth.positions[t])
-        and (not prediction.faces or np.array_equal(prediction.faces[t], truth.faces[t]))
-        for t in range(truth.num_frames)
-    )
-
-
-def _errors(prediction: Track, truth: Track, same: bool) -> list[np.ndarray]:
-    """A frame: (V_t,) millimetres."""
-    found = []
-    for t in range(truth.num_frames):
-        x, y = prediction.positions[t], truth.positions[t]
-        found.append(MM * (vertex_errors(x, y) if same else point_to_surface(x, y, truth.faces[t])))
-    return found
-
-
-def _body(truth: Track) -> MovingMesh | None:
-    if truth.body is None:
-        return None
-    return MovingMesh(truth.body.positions, [truth.body.faces] * truth.body.num_frames)
+    return side_by_side(name, truth, predictions)
