@@ -23,6 +23,7 @@ def bench_report(outcome: Outcome, found: Findings) -> str:
     """HTML: who was scored on how much, tables, figures, methods against each other, a player of samples."""
     protocol = outcome.protocol
     compared, scored = len(outcome.common(list(outcome.entries))), len(outcome.entries)
+    shown = scenes(outcome)
     return render_page(
         "bench.html.j2",
         title=f"muslin: {protocol.title}",
@@ -43,7 +44,7 @@ def bench_report(outcome: Outcome, found: Findings) -> str:
         plots=[{"svg": plot_svg(plot), "caption": plot.title} for plot in found.plots],
         duel_columns=[column(name, text=k < 3) for k, name in enumerate(DUEL_HEADS)],
         duel_rows=[duel_row(duel) for duel in found.duels],
-        viewer=viewer(scenes(outcome)),
+        viewer=viewer(shown) if shown else None,
         origin=_origin(outcome.origin),
     )
 

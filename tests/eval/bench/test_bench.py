@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from muslin.eval.bench.curves import plots
+from muslin.eval.bench.findings import findings
 from muslin.eval.bench.methods import open_method, parse_methods
 from muslin.eval.bench.outcome import Outcome
 from muslin.eval.bench.protocol import parse_protocol
+from muslin.eval.bench.report import bench_report
 from muslin.eval.bench.run import bench
 from muslin.eval.bench.scenes import worst_median_best
 from muslin.eval.bench.score import figure_value
@@ -117,6 +119,14 @@ def test_a_figure_that_one_method_lacks_is_compared_for_none(data):
     ((all_samples,), (moving,)) = fill(outcome, outcome.protocol.tables[0]).cells
     assert all_samples.count == "4"
     assert moving.count == "1 of 4"
+
+
+def test_a_page_without_a_sample_to_show_is_written_all_the_same(data):
+    """The first metric exists for none."""
+    velocity = {"figure": "velocity_error_mm_s.mean", "title": "velocity", "unit": "mm/s"}
+    outcome = run(data, {"one": "one"}, metrics=[velocity], where={"kind": ["drape"]})
+    page = bench_report(outcome, findings(outcome))
+    assert "muslin-viewer" not in page
 
 
 def test_higher_is_better_where_a_metric_says_so(data):
