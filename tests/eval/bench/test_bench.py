@@ -124,7 +124,13 @@ def test_a_figure_that_one_method_lacks_is_compared_for_none(data):
 def test_a_page_without_a_sample_to_show_is_written_all_the_same(data):
     """The first metric exists for none."""
     velocity = {"figure": "velocity_error_mm_s.mean", "title": "velocity", "unit": "mm/s"}
-    outcome = run(data, {"one": "one"}, metrics=[velocity], where={"kind": ["drape"]})
+    outcome = run(
+        data,
+        {"one": "one"},
+        metrics=[velocity],
+        tables=[TABLE | {"metrics": ["velocity_error_mm_s.mean"]}],
+        select={"where": {"kind": ["drape"]}},
+    )
     page = bench_report(outcome, findings(outcome))
     assert "muslin-viewer" not in page
 
