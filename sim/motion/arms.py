@@ -30,11 +30,11 @@ Array = NDArray[np.float64]
 
 CLEARANCE = 0.02
 """Metres between arm and trunk that spreading aims for."""
-MAX_SPREAD = np.radians(30.0)
+MAX_SPREAD = np.radians(45.0)
 """Radians: the most a shoulder is turned; hands that hold on to the body stay there."""
 
 _ROUNDS = 6
-_CHECKS_PER_SECOND = 30.0
+_CHECKS_PER_SECOND = 60.0
 _BLOCK = 64  # frames skinned together
 _ABOVE = 0.5  # cosine to the normal: a point further off lies beside the part, over its edge
 _DEEPEST = 0.12  # metres: no arm is deeper inside a trunk
