@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
+from muslin.sim.dataset.processes import in_processes, usable_cores
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.view.camera import Camera
 from muslin.sim.view.lighting import DRAFT, FINE
@@ -40,27 +36,13 @@ def draw(
     shots: Sequence[Shot], workers: int | None = None, progress: Progress | None = None
 ) -> list[np.ndarray]:
     """Pictures in the order of the shots; by default one process a usable core."""
-    count = min(workers or len(os.sched_getaffinity(0)), max(1, len(shots) // 4))
+    count = min(workers or usable_cores(), max(1, len(shots) // 4))
     pictures: list[np.ndarray] = []
-    for done, image in enumerate(_drawn(shots, count), start=1):
+    for done, image in enumerate(in_processes(_draw, shots, count, chunk=2), start=1):
         pictures.append(image)
         if progress is not None:
             progress(done, len(shots), shots[done - 1].sample_id)
     return pictures
-
-
-def _drawn(shots: Sequence[Shot], workers: int) -> Iterator[np.ndarray]:
-    if workers <= 1:
-        yield from map(_draw, shots)
-        return
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        try:
-            yield from pool.map(_draw, shots, chunksize=2)
-        except BrokenProcessPool as error:
-            raise InputError(
-                "a drawing process died, most often because memory ran out: "
-                f"run again with fewer --workers than {workers}"
-            ) from error
 
 
 def _draw(shot: Shot) -> np.ndarray:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -44,7 +45,7 @@ def line_plot(lines: Mapping[str, Line], x_label: str, y_label: str, points: boo
         axes.grid(alpha=0.15, color=INK)
         if 1 < len(lines) <= 12:
             axes.legend(fontsize=8)
-        return _svg(figure)
+        return page_svg(figure)
 
 
 def bar_plot(names: Sequence[str], values: Sequence[float], x_label: str) -> str:
@@ -56,13 +57,31 @@ def bar_plot(names: Sequence[str], values: Sequence[float], x_label: str) -> str
         axes.set_yticks(range(len(names)), names, fontsize=8)
         axes.invert_yaxis()
         axes.set_xlabel(x_label)
-        return _svg(figure)
+        return page_svg(figure)
+
+
+def page_svg(figure: Figure) -> str:
+    """SVG for a page: without size or background, in the colour of its text. Drawn within `STYLE`."""
+    return inline_svg(_svg(figure)).replace(INK, "currentColor")
+
+
+def file_svg(figure: Figure) -> bytes:
+    """SVG for a file of its own, black on nothing. Drawn within `STYLE`."""
+    return _svg(figure).replace(INK, "#000000").encode()
+
+
+def file_png(figure: Figure, title: str) -> bytes:
+    """PNG on white, with a title. Drawn within `STYLE`."""
+    figure.suptitle(title, fontsize=10)
+    stream = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(stream)
+    return stream.getvalue()
 
 
 def _svg(figure: Figure) -> str:
     stream = io.StringIO()
     FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})
-    return inline_svg(stream.getvalue()).replace(INK, "currentColor")
+    return stream.getvalue()
 
 
 def inline_svg(text: str) -> str:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import io
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from muslin.eval.bench.curves import Curve, Plot
-from muslin.eval.plots import COLOURS, INK, STYLE, inline_svg
+from muslin.eval.plots import COLOURS, INK, STYLE, file_png, file_svg, page_svg
 
 DASHES = ("-", "--", ":", "-.")
 MARKERS = "os^Dv"
@@ -20,30 +16,21 @@ MOST_DOTS = 40  # more points than these are a line without dots
 
 
 def plot_svg(plot: Plot) -> str:
-    """SVG for a page: without size or background, in the colour of its text."""
-    return inline_svg(_svg(plot)).replace(INK, "currentColor")
+    """SVG for a page, see `page_svg`."""
+    with mpl.rc_context(STYLE):
+        return page_svg(_figure(plot))
 
 
 def plot_svg_file(plot: Plot) -> bytes:
-    """SVG for a file of its own, black on nothing."""
-    return _svg(plot).replace(INK, "#000000").encode()
+    """SVG for a file of its own."""
+    with mpl.rc_context(STYLE):
+        return file_svg(_figure(plot))
 
 
 def plot_png(plot: Plot) -> bytes:
     """PNG on white, with its title."""
     with mpl.rc_context(STYLE):
-        figure = _figure(plot)
-        figure.suptitle(plot.title, fontsize=10)
-        stream = io.BytesIO()
-        FigureCanvasAgg(figure).print_png(stream)
-    return stream.getvalue()
-
-
-def _svg(plot: Plot) -> str:
-    stream = io.StringIO()
-    with mpl.rc_context(STYLE):
-        FigureCanvasSVG(_figure(plot)).print_svg(stream, metadata={"Date": None})
-    return stream.getvalue()
+        return file_png(_figure(plot), plot.title)
 
 
 def _figure(plot: Plot) -> Figure:

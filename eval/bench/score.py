@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from muslin.eval.compare import compare
 from muslin.garments.errors import InputError
-from muslin.sim.dataset.processes import leave_interrupts_to_parent, one_thread_each, worker_died
+from muslin.sim.dataset.processes import in_processes
 
 
 @dataclass(frozen=True)
@@ -45,23 +42,7 @@ class Score:
 
 def scores(tasks: Sequence[Task], workers: int) -> Iterator[Score]:
     """Scores in the order of the tasks. A prediction that cannot be scored says so in `refused`."""
-    if workers <= 1 or len(tasks) <= 1:
-        yield from map(run, tasks)
-        return
-    context = multiprocessing.get_context("spawn")
-    with (
-        one_thread_each(),
-        ProcessPoolExecutor(
-            min(workers, len(tasks)), mp_context=context, initializer=leave_interrupts_to_parent
-        ) as pool,
-    ):
-        try:
-            yield from pool.map(run, tasks)
-        except BrokenProcessPool as error:
-            raise worker_died(workers) from error
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    yield from in_processes(run, tasks, workers)
 
 
 def run(task: Task) -> Score:

@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-import io
-
 import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from muslin.eval.plots import COLOURS, INK, STYLE, inline_svg
+from muslin.eval.plots import COLOURS, INK, STYLE, file_png, page_svg
 from muslin.eval.validate.case import Plot
 
 MARKERS = "osD^vP"
 
 
 def plot_svg(plot: Plot) -> str:
-    """SVG without size or background, in the colour of the page's text."""
+    """SVG for a page, see `page_svg`."""
     with mpl.rc_context(STYLE):
-        stream = io.StringIO()
-        FigureCanvasSVG(_figure(plot)).print_svg(stream, metadata={"Date": None})
-    return inline_svg(stream.getvalue()).replace(INK, "currentColor")
+        return page_svg(_figure(plot))
 
 
 def plot_png(plot: Plot) -> bytes:
     """PNG on white, with its caption as title."""
     with mpl.rc_context(STYLE):
-        figure = _figure(plot)
-        figure.suptitle(plot.caption, fontsize=10)
-        stream = io.BytesIO()
-        FigureCanvasAgg(figure).print_png(stream)
-    return stream.getvalue()
+        return file_png(_figure(plot), plot.caption)
 
 
 def _figure(plot: Plot) -> Figure:

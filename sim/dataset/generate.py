@@ -166,7 +166,7 @@ def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progr
                 message = _drain(news, parts)
                 progress(sum(parts[k] * weight[k] for k in weight), sum(weight.values()), message)
         except BrokenProcessPool as error:
-            raise worker_died(count) from error
+            raise worker_died(count, "; what was finished is kept") from error
         except BaseException:
             held.close()  # ends the workers, whatever they are at
             raise

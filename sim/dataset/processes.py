@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from typing import TypeVar
 
 from muslin.garments.errors import InputError
+
+Work = TypeVar("Work")
+Found = TypeVar("Found")
 
 
 def usable_cores() -> int:
@@ -20,10 +27,10 @@ def leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def worker_died(workers: int) -> InputError:
+def worker_died(workers: int, note: str = "") -> InputError:
     """The error for a pool of which a process ended by itself."""
     return InputError(
-        "a worker process died, most often because memory ran out; what was finished is kept: "
+        f"a worker process died, most often because memory ran out{note}: "
         f"run again with fewer --workers than {workers}"
     )
 
@@ -45,3 +52,31 @@ def one_thread_each() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def in_processes(
+    run: Callable[[Work], Found],
+    tasks: Sequence[Work],
+    workers: int,
+    start: Callable[[], None] = leave_interrupts_to_parent,
+    chunk: int = 1,
+) -> Iterator[Found]:
+    """run(task) in the order of the tasks, by so many processes of one thread each; with one, by this one.
+
+    run, start   importable by name; `start` is called once in each process
+    chunk        tasks that a process gets at a time
+
+    Raises InputError if a process dies.
+    """
+    if workers <= 1 or len(tasks) <= 1:
+        yield from map(run, tasks)
+        return
+    context, count = multiprocessing.get_context("spawn"), min(workers, len(tasks))
+    with one_thread_each(), ProcessPoolExecutor(count, mp_context=context, initializer=start) as pool:
+        try:
+            yield from pool.map(run, tasks, chunksize=chunk)
+        except BrokenProcessPool as error:
+            raise worker_died(workers) from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

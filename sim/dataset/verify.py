@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -22,10 +19,9 @@ from muslin.sim.dataset.header import read_header
 from muslin.sim.dataset.index import in_plan_order, listed_ids
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dataset.processes import (
+    in_processes,
     leave_interrupts_to_parent,
-    one_thread_each,
     usable_cores,
-    worker_died,
 )
 from muslin.sim.dataset.sample import Sample
 
@@ -109,7 +105,7 @@ def verify(
     tasks = [task for sample_id in ids for task in _tasks(root, sample_id)]
     count = min(workers or usable_cores(), max(1, len(tasks)))
     findings = []
-    for done, finding in enumerate(_findings(tasks, count), start=1):
+    for done, finding in enumerate(in_processes(_run, tasks, count, _start_worker), start=1):
         findings.append(finding)
         if progress is not None:
             progress(done, len(tasks), finding.sample_id)
@@ -168,27 +164,6 @@ def _check_frame(sample: Sample, frame: int, masked: np.ndarray) -> tuple[tuple[
         if outside:
             reasons.append(f"{outside} of {len(masked)} masked body faces do not lie inside the body")
     return (counts.cloth_cloth, counts.cloth_body), ", ".join(reasons)
-
-
-def _findings(tasks: list[_Task], workers: int) -> Iterable[Finding]:
-    if workers <= 1:
-        return (_run(task) for task in tasks)
-    return _pooled(tasks, workers)
-
-
-def _pooled(tasks: list[_Task], workers: int) -> Iterator[Finding]:
-    context = multiprocessing.get_context("spawn")
-    with (
-        one_thread_each(),
-        ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool,
-    ):
-        try:
-            yield from pool.map(_run, tasks)
-        except BrokenProcessPool as error:
-            raise worker_died(workers) from error
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 def _start_worker() -> None:
