@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from muslin.garments.errors import InputError
+
 BITS = 10  # of a Morton code, an axis
+MOST_PAIRS = 4_000_000
+"""A garment that crosses body or itself nearly everywhere has some thousands; noise has tens of millions."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +84,19 @@ def overlapping_within(tree: BoxTree) -> NDArray[np.int64]:
 def _meeting(
     a: BoxTree, level_a: int, i: NDArray[np.int32], b: BoxTree, level_b: int, j: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The pairs of nodes whose boxes overlap; axis by axis, since most part on the first."""
+    """The pairs of nodes whose boxes overlap; axis by axis, since most part on the first.
+
+    Raises InputError for more than `MOST_PAIRS`.
+    """
     for axis in (1, 0, 2):
         meet = a.low[level_a][axis].take(i) <= b.high[level_b][axis].take(j)
         meet &= b.low[level_b][axis].take(j) <= a.high[level_a][axis].take(i)
         i, j = i[meet], j[meet]
+    if len(i) > MOST_PAIRS:
+        raise InputError(
+            f"intersections: more than {MOST_PAIRS} pairs of triangles come near one another; such a surface "
+            "is no garment: check what predicts it, and leave contact out (--metrics)"
+        )
     return i, j
 
 

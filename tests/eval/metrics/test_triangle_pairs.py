@@ -10,6 +10,7 @@ import trimesh
 from muslin.eval.metrics.box_pairs import box_tree, overlapping, overlapping_within
 from muslin.eval.metrics.rational_triangles import APART, COPLANAR, CROSSING, triangles_meet
 from muslin.eval.metrics.triangle_pairs import intersecting_triangles, self_intersecting_triangles
+from muslin.garments.errors import InputError
 from muslin.sim.dataset.intersections import count_intersections
 from tests.eval.metrics.shapes import lifted, sheet, sphere, turned
 
@@ -171,3 +172,12 @@ def test_no_triangles_no_pairs():
     assert len(intersecting_triangles(v, f, v + 100.0, f)) == 0
     assert len(self_intersecting_triangles(v, none)) == 0
     assert len(self_intersecting_triangles(v, f[:1])) == 0
+
+
+def test_noise_is_refused_before_it_takes_hours():
+    corners = np.random.default_rng(2).random((12_000, 3))
+    faces = np.arange(12_000).reshape(-1, 3)
+    with pytest.raises(InputError, match="such a surface is no garment"):
+        self_intersecting_triangles(corners, faces)
+    with pytest.raises(InputError, match="such a surface is no garment"):
+        intersecting_triangles(corners, faces, corners[::-1], faces)
