@@ -113,8 +113,8 @@ class SolverTable(Table):
     max_work: Annotated[int, Field(ge=1, le=1_000_000)] = 2000
     contact_range: Annotated[float, Field(ge=5e-4, le=1e-2)] = 2.0e-3
     contact_stiffness: Positive = 1.0
-    settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 150
-    settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 1.0e-4
+    settle_steps: Annotated[int, Field(ge=1, le=10_000)] = 300
+    settle_tolerance: Annotated[float, Field(ge=1e-6, le=1e-2)] = 5.0e-5
 
     def substeps(self, fps: float) -> int:
         """The fewest equal steps of at most `dt` in a frame of 1 / `fps` seconds."""

@@ -195,7 +195,7 @@ def test_killed_at_any_moment_it_completes_to_the_same_dataset(whole: Path, tmp_
         time.sleep(moments.uniform(0.0, 2 * delay))
         orphans = children(process.pid)
         process.send_signal(how)
-        process.communicate()
+        process.communicate(timeout=120)
         wait_until_gone(orphans)
         before, kept = kept, len(store.stored_ids(out))
         assert before < kept
@@ -216,6 +216,8 @@ def start(out: Path, delay: float, workers: int = 1, hold: float = math.inf) -> 
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
+        # What a shell starts in the background ignores interrupts, and so would this process.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
