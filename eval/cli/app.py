@@ -18,6 +18,7 @@ from muslin.eval.cli.info import info
 from muslin.eval.cli.pattern import pattern
 from muslin.eval.cli.remesh import remesh
 from muslin.eval.cli.render import render
+from muslin.eval.cli.repair import repair
 from muslin.eval.cli.report import report
 from muslin.eval.cli.simulate import simulate
 from muslin.eval.cli.validate import validate
@@ -86,6 +87,7 @@ for name, command, summary in (
     ("simulate", simulate, "One scene to a verified sample."),
     ("generate", generate, "A dataset from its configuration; goes on where it stopped."),
     ("verify", verify, "Count all intersections of a dataset again."),
+    ("repair", repair, "Make again what is damaged or missing in a dataset."),
     ("info", info, "What a dataset holds."),
     ("eval", evaluate, "Score a prediction against the truth."),
     ("bench", bench, "Methods against each other by a protocol."),

@@ -45,6 +45,10 @@ def generate(
 
         result = run(loaded, out, workers=workers, device=name, progress=progress)
     typer.echo(f"{out}: {len(result.made)} samples made, {len(result.kept)} kept, {result.seconds:.1f} s")
+    if not result.card:
+        typer.echo(
+            f"{out}/README.md: left as it is, for it is no dataset card; move it away to have one written"
+        )
     if result.failed:
         for sample_id, reason in result.failed.items():
             typer.echo(f"  {sample_id}: {reason}", err=True)

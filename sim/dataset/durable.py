@@ -49,6 +49,13 @@ def commit_directory(partial: Path, final: Path) -> bool:
     return True
 
 
+def move(path: Path, place: Path) -> None:
+    """Move a file or folder to a place of the same file system where nothing lies."""
+    os.rename(path, place)
+    _sync(path.parent)
+    _sync(place.parent)
+
+
 @contextmanager
 def exclusive(lock: Path) -> Iterator[None]:
     """Hold a lock file for as long as the block runs; the system frees it when the process dies.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import queue
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
@@ -14,9 +14,11 @@ from typing import Any, Protocol
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable, store
+from muslin.sim.dataset.aside import set_aside
+from muslin.sim.dataset.card import write_card
 from muslin.sim.dataset.config import DatasetConfig
 from muslin.sim.dataset.header import Header, prepare_root
-from muslin.sim.dataset.index import write_index
+from muslin.sim.dataset.index import read_index, write_index
 from muslin.sim.dataset.jobs import Plan
 from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.processes import one_thread_each, usable_cores, worker_died
@@ -35,12 +37,20 @@ class Progress(Protocol):
 
 @dataclass(frozen=True)
 class GenerateReport:
-    """made, kept (there already): ids in plan order; failed: {id: reason}."""
+    """What `generate` did.
+
+    made, kept   ids in plan order; `kept` were there already
+    failed       {id: reason}
+    aside        {id: place} of what was set aside to be made again
+    card         False if README.md is not the dataset's card but somebody's own, and was left as it is
+    """
 
     made: tuple[str, ...]
     kept: tuple[str, ...]
     failed: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
+    aside: dict[str, Path] = field(default_factory=dict)
+    card: bool = True
 
 
 def generate(
@@ -52,6 +62,7 @@ def generate(
     progress: Progress | None = None,
     simulate: ChainSimulator | None = None,
     make_scene: Callable[[dict[str, Any]], Any] | None = None,
+    again: Collection[str] = (),
 ) -> GenerateReport:
     """Make every planned sample that is not there yet.
 
@@ -62,6 +73,8 @@ def generate(
     workers      processes; by default one a usable core on the CPU, one on a GPU
     simulate     `muslin.sim.run.simulate_chain` unless given
     make_scene   from the values of a scene file to a scene; `muslin.sim.scene.parse_scene` unless given
+    again        ids of samples to make again: once nothing stands in the way of that, what is there of them
+                 is moved to `failed/`
 
     A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a
     scene that cannot be or names what is not there, for a folder that may not be written to (see
@@ -72,6 +85,13 @@ def generate(
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers}: must be 1 or more")
     planned = plan(config)
+    strangers = sorted(set(again) - planned.splits.keys())
+    if strangers:
+        raise InputError(
+            f"{root}: {', '.join(strangers[:3])}: not planned by the dataset's config, so not to be made "
+            f"again from it ({len(strangers)} in all); restore them from a copy, or take them out of the "
+            "dataset"
+        )
     scenes = _scenes(planned, make_scene or _default_make_scene())
     if make_scene is None:
         check_sources(scene for chain in scenes for scene in chain)
@@ -79,9 +99,12 @@ def generate(
     header = Header(config=config.model_dump(mode="json"), splits=planned.splits, solver_digest=solver)
     before = prepare_root(root, header)
     with durable.exclusive(root / LOCK):
-        there = set(store.stored_ids(root))
+        stored = store.stored_ids(root)
+        there = {sample_id for sample_id in stored if sample_id not in again}
         missing = frozenset(job.id for job in planned.jobs if job.id not in there)
-        _check_solver(root, before, header, bool(missing), bool(there))
+        # Samples to be made again must be those of the solver that made them, even where no other is left.
+        _check_solver(root, before, header, bool(missing), bool(stored or again))
+        places = {sample_id: set_aside(root, sample_id) for sample_id in again}
         if before is not None and not missing:
             header = replace(header, solver_digest=before.solver_digest, versions=before.versions)
         header.write(root)
@@ -94,9 +117,11 @@ def generate(
         failed = _run(todo, workers, device, progress or _silent) if todo else {}
         store.clean_partial(root)
         write_index(root, header)
+        card = write_card(root, header, read_index(root, header), planned.jobs)
     made = tuple(job.id for job in planned.jobs if job.id in missing and job.id not in failed)
     kept = tuple(job.id for job in planned.jobs if job.id in there)
-    return GenerateReport(made, kept, failed, time.perf_counter() - started)
+    aside = {sample_id: place for sample_id, place in places.items() if place is not None}
+    return GenerateReport(made, kept, failed, time.perf_counter() - started, aside, card)
 
 
 def _check_solver(root: Path, before: Header | None, header: Header, missing: bool, there: bool) -> None:
@@ -109,7 +134,7 @@ def _check_solver(root: Path, before: Header | None, header: Header, missing: bo
     ]
     raise InputError(
         f"{root}: its samples were made by another solver ({', '.join(changed) or 'its code changed'}); "
-        "one dataset holds the samples of one solver: write to another folder"
+        "one dataset holds the samples of one solver: write to another folder, or install what made them"
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
-from muslin.sim.dataset.schema import FORMAT, HEADER, LOCK, PARTIAL, SAMPLES, SCHEMA_VERSION
+from muslin.sim.dataset.schema import CARD, FORMAT, HEADER, LOCK, PARTIAL, SAMPLES, SCHEMA_VERSION
 
 
 def canonical(value: Any) -> bytes:
@@ -137,7 +137,9 @@ def _leaves(value: Any, prefix: str = "") -> dict[str, Any]:
 
 
 def _own(name: str) -> bool:
-    return name in (LOCK, PARTIAL, SAMPLES) or (name.startswith(f".{HEADER}.") and name.endswith(".tmp"))
+    return name in (CARD, LOCK, PARTIAL, SAMPLES) or (
+        name.startswith(f".{HEADER}.") and name.endswith(".tmp")
+    )
 
 
 _RESTORE = "restore it from a copy, or generate the dataset again in a new folder"

@@ -2,8 +2,10 @@
 
     ROOT/muslin.json               header: schema version, config, versions, solver digest, splits
     ROOT/index.parquet             one row a sample; a cache of what the samples say, rebuilt when missing
+    ROOT/README.md                 card: what the dataset is, for people; written by `generate`
     ROOT/samples/ID.zarr/          one zarr 3 group a sample
     ROOT/failed/ID.npz             last good state of a sample whose simulation could not go on
+    ROOT/failed/ID.zarr-N/         a sample that was found damaged, set aside by `muslin repair`
     ROOT/.partial/, ROOT/.lock     samples being written, and the lock of the process that writes
 
 Attributes of a group: `meta` (what is not an array, certificate included), `sha256` of every array's bytes (C
@@ -26,6 +28,7 @@ FORMAT = "muslin dataset"
 
 HEADER = "muslin.json"
 INDEX = "index.parquet"
+CARD = "README.md"
 SAMPLES = "samples"
 PARTIAL = ".partial"
 FAILED = "failed"

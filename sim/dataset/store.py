@@ -32,7 +32,7 @@ from muslin.sim.dataset.schema import (
     chunk_rows,
 )
 
-_REMEDY = "delete the folder of this sample and run `muslin generate` again, or restore it from a copy"
+_REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
 
 
 def sample_path(root: Path, sample_id: str) -> Path:
@@ -42,6 +42,8 @@ def sample_path(root: Path, sample_id: str) -> Path:
 def stored_ids(root: Path) -> list[str]:
     """Ids of the samples that are there, sorted."""
     folder = root / SAMPLES
+    if not folder.is_dir():
+        return []
     return sorted(p.name.removesuffix(SUFFIX) for p in folder.iterdir() if p.name.endswith(SUFFIX))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -87,6 +87,7 @@ class Finding:
 def verify(
     path: str | Path,
     *,
+    ids: Collection[str] | None = None,
     workers: int | None = None,
     progress: Callable[[float, int, str], None] | None = None,
 ) -> Verification:
@@ -97,19 +98,23 @@ def verify(
     not the one that it was made with, if any frame has an intersection, or if a body face was left out of
     contact that does not lie inside the body (or within `MASK_GAP_M` of another part of it). Raises
     InputError if the folder is no dataset.
+
+    ids   check only these; unless given, all that are stored and all that the index lists
     """
     root = Path(path)
     header = read_header(root)
-    ids = in_plan_order(header, {*listed_ids(root), *store.stored_ids(root)})
+    _sample.cache_clear()  # the dataset may have changed since this process verified it last
+    stored = store.stored_ids(root)
+    wanted = in_plan_order(header, {*listed_ids(root), *stored} if ids is None else ids)
     # Damaged attributes fail their sample, so they must not fail the listing.
-    tasks = [task for sample_id in ids for task in _tasks(root, sample_id)]
+    tasks = [task for sample_id in wanted for task in _tasks(root, sample_id)]
     count = min(workers or usable_cores(), max(1, len(tasks)))
     findings = []
     for done, finding in enumerate(in_processes(_run, tasks, count, _start_worker), start=1):
         findings.append(finding)
         if progress is not None:
             progress(done, len(tasks), finding.sample_id)
-    return _summary(len(ids), len(header.splits.keys() - set(ids)), findings)
+    return _summary(len(wanted), len(header.splits.keys() - {*wanted, *stored}), findings)
 
 
 def _tasks(root: Path, sample_id: str) -> list[_Task]:

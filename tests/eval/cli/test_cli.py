@@ -13,7 +13,7 @@ from muslin.sim.dataset.reader import open_dataset, write_dataset
 from tests.eval.cli.commands import muslin, refused
 
 COMMANDS = ("simulate", "generate", "verify", "info", "eval", "report", "export", "pattern", "remesh")
-COMMANDS += ("render", "view")
+COMMANDS += ("render", "view", "repair")
 
 
 @pytest.fixture
@@ -60,6 +60,21 @@ def test_verify_fails_on_an_intersecting_sample(tmp_path, make_sample):
     found = json.loads((tmp_path / "v.json").read_text())
     assert found["failed"] == ["cut"]
     assert found["cloth_body_intersections"] > 0
+
+
+def test_repair_lists_what_is_damaged_and_moves_nothing_that_it_cannot_make_again(dataset):
+    muslin("repair", dataset, "--workers", 1, "--dry-run")
+    assert (
+        "2 samples checked, 0 damaged, 0 missing, 0 made" in muslin("repair", dataset, "--workers", 1).output
+    )
+    attributes = dataset / "samples" / "still.zarr" / "zarr.json"
+    attributes.write_bytes(attributes.read_bytes()[:100])
+    listed = muslin("repair", dataset, "--workers", 1, "--dry-run", code=1).output
+    assert "still: " in listed
+    assert "1 damaged" in listed
+    refused("repair", dataset, "--workers", 1, says="not planned by the dataset's config")
+    assert attributes.stat().st_size == 100
+    assert not (dataset / "failed").exists()
 
 
 def test_info(dataset):
