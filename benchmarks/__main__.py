@@ -145,6 +145,21 @@ def standard(
 
 
 @app.command()
+def storage(
+    source: Annotated[Path, typer.Argument(help="A dataset.")],
+    out: Out = OUT / "storage",
+    reads: Annotated[int, typer.Option(help="Frames to read at random.", min=20)] = 400,
+) -> None:
+    """What positions cost on disk, coded in several ways, and reading one frame; write storage.md."""
+    from benchmarks.storage import measure
+
+    text = measure(source, reads).table()
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "storage.md").write_text(f"{machine()}\n\n{text}\n", encoding="utf-8")
+    typer.echo(text)
+
+
+@app.command()
 def surface(
     out: Out = OUT / "surface",
     peers: Annotated[Path, typer.Option(help="Folder of the peers' environments.")] = OUT / "peers",

@@ -14,6 +14,7 @@ from muslin.sim.dataset.sample import Sample
 from muslin.sim.elastic import principal_stretches
 from muslin.sim.relax import RestReport
 from muslin.sim.remesh.in_loop import Remesher
+from muslin.sim.rounding import STEP_M, round_sample
 from muslin.sim.scene import Scene
 
 
@@ -42,6 +43,17 @@ def certify(sample: Sample, base: Certificate) -> Sample:
             largest_strain=stretch - 1.0,
         ),
     )
+
+
+def certify_rounded(sample: Sample, base: Certificate) -> Sample:
+    """`sample` on the grid of `muslin.sim.rounding`, certified there; as it is, if it crosses itself or the
+    collider on the grid. `position_step_m` in the certificate's `extra` is the step, 0 without rounding."""
+    for made, step in ((round_sample(sample), STEP_M), (sample, 0.0)):
+        noted = replace(base, extra={**base.extra, "position_step_m": step})
+        found = certify(made, noted)
+        if not (found.certificate.cloth_cloth_intersections or found.certificate.cloth_body_intersections):
+            break
+    return found
 
 
 def solved(

@@ -15,7 +15,7 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.load import load_body
 from muslin.sim.body.model import BodyModel
 from muslin.sim.budget import with_budget
-from muslin.sim.certify import certify, solved
+from muslin.sim.certify import certify_rounded, solved
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.remeshed import sample_of_frames
 from muslin.sim.dataset.sample import BodyTrack, Sample
@@ -270,4 +270,4 @@ def _sample(
         labels={"sequence": clip.name, "motion_source": clip.source} if clip is not None else {},
     )
     distance = min(state[3] for state in states)
-    return certify(sample, solved(scene, distance, rest, started, len(positions), worn.remesher))
+    return certify_rounded(sample, solved(scene, distance, rest, started, len(positions), worn.remesher))

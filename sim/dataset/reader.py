@@ -9,8 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable, store
+from muslin.sim.dataset.frames import read_frame
 from muslin.sim.dataset.header import Header, prepare_root, read_header
 from muslin.sim.dataset.index import read_index, write_index
 from muslin.sim.dataset.sample import Sample
@@ -57,12 +61,23 @@ class Dataset:
 
     def __getitem__(self, key: str | int) -> Sample:
         """A sample by id or by place. Raises InputError for an unknown id and for a damaged sample."""
+        sample_id = self._id(key)
+        sample = store.read_sample(self.root, sample_id)
+        return replace(sample, labels=sample.labels | {"split": self.header.splits.get(sample_id, "")})
+
+    def frame(self, key: str | int, frame: int) -> NDArray[np.float32]:
+        """(V_t, 3) float32 positions in one frame of a sample, metres, without reading the others.
+
+        Raises InputError for an unknown id, a frame that is not there, and for damage to what was read.
+        """
+        return read_frame(self.root, self._id(key), frame)
+
+    def _id(self, key: str | int) -> str:
         sample_id = self.ids[key] if isinstance(key, int) else key
         if sample_id not in self:
             near = get_close_matches(sample_id, self.ids, n=3, cutoff=0.4) or self.ids[:3]
             raise InputError(f"{self.root}: has no sample {sample_id!r}; it has {', '.join(near)} …")
-        sample = store.read_sample(self.root, sample_id)
-        return replace(sample, labels=sample.labels | {"split": self.header.splits.get(sample_id, "")})
+        return sample_id
 
     def split(self, name: str) -> Dataset:
         """The samples of one split. Raises InputError if there is no such split."""

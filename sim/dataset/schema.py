@@ -35,7 +35,7 @@ FAILED = "failed"
 LOCK = ".lock"
 SUFFIX = ".zarr"
 
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 18
 """Frames (or their rows) are gathered in chunks of about this size, so that one frame can be read without the
 whole sequence."""
 
@@ -56,6 +56,11 @@ class ArraySpec:
     def by_rows(self) -> bool:
         """Whether the first dimension may be long: then it is cut into chunks."""
         return self.dimensions[0] == "frame" or self.dimensions[0].startswith(STACKED)
+
+    @property
+    def is_coordinates(self) -> bool:
+        """Whether it holds points: then x, y and z are stored apart."""
+        return self.dtype == "float32" and self.dimensions[-1] == "xyz"
 
 
 GARMENT_ARRAYS = {

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import zarr
-from zarr.codecs import BloscCname, BloscCodec, BloscShuffle
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.cloth_arrays import cloth_arrays, cloth_of
+from muslin.sim.dataset.codecs import create_array, numcodecs_unremarked
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.remeshed import RemeshedSequence
 from muslin.sim.dataset.sample import BodyTrack, Sample
@@ -29,7 +29,6 @@ from muslin.sim.dataset.schema import (
     SAMPLES,
     SUFFIX,
     ArraySpec,
-    chunk_rows,
 )
 
 _REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
@@ -73,7 +72,7 @@ def write_sample(root: Path, sample: Sample) -> bool:
         attributes={"meta": meta, "meta_sha256": digest(meta), "sha256": checksums},
     )
     for name, array in arrays.items():
-        _write_array(group, name, array, specs[name])
+        create_array(group, name, array, specs[name])
     return durable.commit_directory(partial, sample_path(root, sample.id))
 
 
@@ -204,26 +203,10 @@ def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
     )
 
 
-def _write_array(group: zarr.Group, name: str, array: np.ndarray, spec: ArraySpec) -> None:
-    chunks = tuple(max(1, n) for n in array.shape)
-    shards = None
-    if spec.by_rows and (rows := chunk_rows(array.shape, array.itemsize)) < array.shape[0]:
-        chunks = (rows, *chunks[1:])
-        shards = (-(-array.shape[0] // rows) * rows, *chunks[1:])
-    group.create_array(
-        name,
-        data=array,
-        chunks=chunks,
-        shards=shards,
-        compressors=BloscCodec(cname=BloscCname.zstd, clevel=5, shuffle=BloscShuffle.shuffle),
-        dimension_names=spec.dimensions,
-        attributes={"meaning": spec.meaning},
-    )
-
-
 def _read_array(group: zarr.Group, path: Path, name: str, checksum: str) -> np.ndarray:
     try:
-        array = np.asarray(group[name][...])  # type: ignore[index]
+        with numcodecs_unremarked():
+            array = np.asarray(group[name][...])  # type: ignore[index]
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}/{name}: not readable ({error}); {_REMEDY}") from error
     if _sha256(array) != checksum:
