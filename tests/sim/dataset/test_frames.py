@@ -59,7 +59,7 @@ def test_what_is_not_there_is_named(dataset: Dataset) -> None:
 
 @pytest.mark.parametrize("opened_before", [False, True])
 def test_any_flipped_bit_is_found_by_a_frame_that_needs_it(dataset: Dataset, opened_before: bool) -> None:
-    """Every byte of the shard is flipped in turn: frames are right, or refused, and each byte spoils some."""
+    """A bit of every seventh byte of the shard is flipped in turn, and the frame refused each time."""
     file = shard(dataset, "still")
     whole, truth = file.read_bytes(), dataset["still"].positions[0]
     if opened_before:
