@@ -60,6 +60,14 @@ def derivative_errors(prediction: np.ndarray, truth: np.ndarray, fps: float, ord
     return np.linalg.norm(derivatives(difference, fps, order), axis=-1)
 
 
+def velocity_errors(prediction: np.ndarray, truth: np.ndarray, fps: float) -> np.ndarray:
+    """|v_i - w_i|, v = (x_{t+1} - x_t) fps; of (T >= 2, V, 3), metres; (T - 1, V), m/s.
+
+    A constant offset in space costs nothing here; one that jumps by d from a frame to the next costs d fps.
+    """
+    return derivative_errors(prediction, truth, fps, 1)
+
+
 def acceleration_errors(prediction: np.ndarray, truth: np.ndarray, fps: float) -> np.ndarray:
     """|a_i - b_i|, a = (x_{t+2} - 2 x_{t+1} + x_t) fps^2; of (T >= 3, V, 3), metres; (T - 2, V), m/s^2."""
     return derivative_errors(prediction, truth, fps, 2)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muslin.eval.metrics.accumulate import ErrorAccumulator
-from muslin.eval.metrics.velocity import velocities, velocity_errors
+from muslin.eval.metrics.motion import derivatives, velocity_errors
 from muslin.eval.metrics.vertex import statistics, vertex_areas, vertex_errors
 from muslin.garments.errors import InputError
 
@@ -67,7 +67,7 @@ def test_area_weights_cancel_uneven_sampling():
 def test_velocity_of_uniform_motion():
     t = np.arange(5)[:, None, None] / 24.0
     x = np.array([[[0.0, 0, 0], [1, 1, 1]]]) + t * np.array([1.0, -2.0, 0.5])
-    assert velocities(x, 24.0) == pytest.approx(np.broadcast_to([1.0, -2.0, 0.5], (4, 2, 3)))
+    assert derivatives(x, 24.0, 1) == pytest.approx(np.broadcast_to([1.0, -2.0, 0.5], (4, 2, 3)))
 
 
 def test_velocity_error_ignores_offset_and_counts_jitter_by_rate():
@@ -95,8 +95,8 @@ def test_accumulator_equals_all_at_once():
         lambda: vertex_errors(np.full((3, 3), np.nan), np.zeros((3, 3))),
         lambda: statistics(np.zeros(0)),
         lambda: statistics(np.ones(2), np.zeros(2)),
-        lambda: velocities(np.zeros((1, 4, 3)), 30.0),
-        lambda: velocities(np.zeros((2, 4, 3)), 0.0),
+        lambda: derivatives(np.zeros((1, 4, 3)), 30.0, 1),
+        lambda: derivatives(np.zeros((2, 4, 3)), 0.0, 1),
     ],
 )
 def test_bad_input_is_named(call):
