@@ -101,6 +101,7 @@ BESIDE = (
 def comparison_report(comparison: Comparison) -> str:
     """HTML of a comparison: figures, plots over frames and over beta, the worst pairs seen and played."""
     figures = comparison.figures
+    worst = [(pair, _loaded(comparison, pair)) for pair in _worst(comparison)]
     return render_page(
         "comparison.html.j2",
         title="muslin: comparison",
@@ -115,8 +116,8 @@ def comparison_report(comparison: Comparison) -> str:
         band_columns=[column(name) for name in ("wavelength, m", "prediction, 1/m", "truth, 1/m", "kept, %")],
         band_rows=_band_rows(figures),
         plots=_frame_plots(comparison.pairs) + _beta_plots(comparison.pairs),
-        heat_maps=_heat_maps(comparison),
-        viewer=_viewer(comparison),
+        heat_maps=_heat_maps(worst),
+        viewer=_viewer(worst),
         pair_columns=[
             column("sample", text=True),
             column("design", text=True),
@@ -169,7 +170,7 @@ def _rows(figures: dict[str, Any]) -> list[list[str]]:
     rows = []
     for key, (label, factor) in DISTRIBUTIONS.items():
         rows.append([label, *(number(figure(figures, f"{key}.{name}", factor)) for name in STATISTICS)])
-    if "hausdorff_mm" in figures:
+    if figures.get("hausdorff_mm") is not None:
         bounds = f"{number(figures['hausdorff_mm'])} (at most {number(figures['hausdorff_upper_mm'])})"
         means = (number(figures[f"{name}_surface_distance_mm"]) for name in ("mean", "rms"))
         rows.append(["surface distance, mm", *means, number(None), number(None), bounds])
@@ -244,7 +245,7 @@ def _beta_plots(pairs: Sequence[PairScore]) -> list[dict[str, str]]:
         designs: dict[str, list[tuple[float, float]]] = {}
         for pair, beta in zip(still, betas, strict=True):
             name = pair.labels.get("design", "") or "garment"
-            if key in pair.figures:
+            if pair.figures.get(key) is not None:
                 designs.setdefault(name, []).append((float(beta[component]), pair.figures[key]))
         lines: dict[str, Line] = {}
         for name, points in designs.items():
@@ -269,10 +270,10 @@ def _loaded(comparison: Comparison, pair: PairScore) -> Pair:
     return paired(predictions.load(pair.prediction), truths.load(pair.truth))
 
 
-def _heat_maps(comparison: Comparison) -> list[dict[str, str]]:
+def _heat_maps(worst: Sequence[tuple[PairScore, Pair]]) -> list[dict[str, str]]:
     entries = []
-    for pair in _worst(comparison):
-        both, frame = _loaded(comparison, pair), _worst_frame(pair)
+    for pair, both in worst:
+        frame = _worst_frame(pair)
         entries.append(
             {
                 "picture": picture_source(heat_map(both.prediction, both.truth, frame)),
@@ -292,11 +293,8 @@ def _worst_frame(pair: PairScore) -> int:
     return 0
 
 
-def _viewer(comparison: Comparison) -> Markup:
-    scenes = []
-    for pair in _worst(comparison):
-        both = _loaded(comparison, pair)
-        scenes.append(side_by_side(_name(pair), both.truth, {"prediction": both.prediction}))
+def _viewer(worst: Sequence[tuple[PairScore, Pair]]) -> Markup:
+    scenes = [side_by_side(_name(pair), both.truth, {"prediction": both.prediction}) for pair, both in worst]
     return viewer(scenes, budget=SHOWN)
 
 

@@ -73,7 +73,7 @@ class Regression:
         again = f"run pytest {OPTION} to write it"
         if not self._regenerate and not path.is_file():
             pytest.fail(f"{path}: no baseline yet; {again}", pytrace=False)
-        found = measured(compare(prediction, truth, fps=fps, metrics=metrics).to_dict(), truth)
+        found = measured(compare(prediction, truth, fps=fps, metrics=metrics).to_dict())
         if self._regenerate:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_baseline(path, found)

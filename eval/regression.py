@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from muslin.eval.page import write_atomically
-from muslin.eval.provenance import provenance
 from muslin.garments.errors import InputError
 
 FORMAT, FORMAT_VERSION = "muslin baseline", 1
@@ -84,10 +83,10 @@ class Row:
         return f"{before}, now {self.now:.5g}, allowed {bound} {self.allowed:.5g}"
 
 
-def measured(result: Mapping[str, Any], truth: str | Path) -> Measured:
-    """What a baseline keeps of `Comparison.to_dict()`; the content of `truth`, compared to, is hashed."""
+def measured(result: Mapping[str, Any]) -> Measured:
+    """What a baseline keeps of `Comparison.to_dict()`."""
     figures = {key: value for key, value in result.items() if key not in NOT_FIGURES}
-    return Measured(_flat(figures), result["samples"], result["frames"], provenance(truth))
+    return Measured(_flat(figures), result["samples"], result["frames"], result["origin"])
 
 
 def regressions(baseline: Measured, now: Measured, tolerances: Tolerances | None = None) -> list[Row]:

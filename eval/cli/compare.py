@@ -130,7 +130,7 @@ def evaluate(
         write_atomically(html_file, comparison_report(result).encode())
     for line in _summary(result.to_dict()):
         typer.echo(line)
-    found = measured(result.to_dict(), truth) if baseline or new_baseline else None
+    found = measured(result.to_dict()) if baseline or new_baseline else None
     worse = regressions(before, found, limits) if before and found else []
     if worse:
         for row in worse:
@@ -151,7 +151,7 @@ def _summary(figures: dict) -> list[str]:
         if figures.get(key) is not None:
             values = "  ".join(f"{name} {figures[key][name]:.4g}" for name in ("mean", "rms", "p95", "max"))
             lines.append(f"{label:18} {values} {unit}")
-    if "hausdorff_mm" in figures:
+    if figures.get("hausdorff_mm") is not None:
         lines.append(f"{'surface distance':18} mean {figures['mean_surface_distance_mm']:.4g} mm")
         upper = figures["hausdorff_upper_mm"]
         lines.append(f"{'Hausdorff':18} {figures['hausdorff_mm']:.4g} mm (at most {upper:.4g})")

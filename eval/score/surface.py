@@ -11,6 +11,13 @@ from muslin.eval.read.pairing import Pair
 from muslin.eval.score.family import MM, Family
 from muslin.eval.score.frame import PairFrame
 
+FIGURES = (
+    "hausdorff_mm",
+    "hausdorff_upper_mm",
+    "hausdorff_mean_mm",
+    "mean_surface_distance_mm",
+    "rms_surface_distance_mm",
+)
 SOME_FRAMES = "surface distances of some frames of a sequence only, evenly spread (--surface-frames)"
 
 
@@ -45,6 +52,8 @@ class SurfaceDistances(Family):
             getattr(self, name).extend(getattr(other, name))
 
     def figures(self) -> dict[str, Any]:
+        if not self.lower:
+            return dict.fromkeys(FIGURES)
         return {
             "hausdorff_mm": MM * max(self.lower),
             "hausdorff_upper_mm": MM * max(self.upper),

@@ -24,7 +24,6 @@ OPEN_SAMPLES, WHOLE_SAMPLES = 4096, 4
 """How many samples are kept open for the next frame; and how many in memory, of those without checksums of
 chunks, which only can be read whole."""
 
-_REMEDY = "restore the sample from a copy, or delete its folder and run `muslin generate` again"
 _UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError)
 
 
@@ -47,9 +46,9 @@ def read_frame(root: Path, sample_id: str, frame: int) -> NDArray[np.float32]:
     try:
         positions = np.asarray(opened.checked[rows])
     except _UNREADABLE as error:
-        raise InputError(f"{path}: frame {frame} is not readable ({error}); {_REMEDY}") from error
+        raise InputError(f"{path}: frame {frame} is not readable ({error}); {store.REMEDY}") from error
     if not np.isfinite(positions).all():
-        raise InputError(f"{path}: part of frame {frame} is missing; {_REMEDY}")
+        raise InputError(f"{path}: part of frame {frame} is missing; {store.REMEDY}")
     return positions
 
 
@@ -85,11 +84,11 @@ def _open(root: Path, sample_id: str, stamp: Stamp) -> _Opened:
         with numcodecs_unremarked():
             array = zarr.open_array(zarr.storage.LocalStore(path, read_only=True), mode="r", zarr_format=3)
     except _UNREADABLE as error:
-        raise InputError(f"{path}/zarr.json: not readable ({error}); {_REMEDY}") from error
+        raise InputError(f"{path}/zarr.json: not readable ({error}); {store.REMEDY}") from error
     if array.shape != shape or array.dtype != np.float32:
         raise InputError(
             f"{path}/zarr.json: {array.dtype} of shape {array.shape}, where the sample has float32 of shape "
-            f"{shape}; {_REMEDY}"
+            f"{shape}; {store.REMEDY}"
         )
     return _Opened(stamp, frames, array if checks_chunks(array) else None, starts)
 

@@ -31,7 +31,7 @@ from muslin.sim.dataset.schema import (
     ArraySpec,
 )
 
-_REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
+REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
 
 
 def sample_path(root: Path, sample_id: str) -> Path:
@@ -87,14 +87,14 @@ def read_meta(root: Path, sample_id: str) -> tuple[dict[str, Any], dict[str, str
     attributes = dict(_open(path).attrs)
     meta, checksums = attributes.get("meta"), attributes.get("sha256")
     if not isinstance(meta, dict) or not isinstance(checksums, dict):
-        raise InputError(f"{path}/zarr.json: not the attributes of a sample; {_REMEDY}")
+        raise InputError(f"{path}/zarr.json: not the attributes of a sample; {REMEDY}")
     if meta.get("schema_version", 0) > REMESHED_SAMPLE_VERSION:
         raise InputError(
             f"{path}: schema_version = {meta['schema_version']} is newer than {REMESHED_SAMPLE_VERSION}, the "
             "newest that  this program reads; update muslin (pip install -U muslin)"
         )
     if attributes.get("meta_sha256") != digest(meta):
-        raise InputError(f"{path}/zarr.json: attributes do not match their checksum; {_REMEDY}")
+        raise InputError(f"{path}/zarr.json: attributes do not match their checksum; {REMEDY}")
     return meta, checksums
 
 
@@ -107,9 +107,9 @@ def read_sample(root: Path, sample_id: str) -> Sample:
     try:
         sample = _assemble(meta, arrays)
     except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: the sample lacks {error}; {_REMEDY}") from error
+        raise InputError(f"{path}: the sample lacks {error}; {REMEDY}") from error
     except InputError as error:
-        raise InputError(f"{path}: {error}; {_REMEDY}") from error
+        raise InputError(f"{path}: {error}; {REMEDY}") from error
     if sample.id != sample_id:
         raise InputError(f"{path}: holds sample {sample.id!r}; rename the folder to {sample.id}{SUFFIX}")
     return sample.validate()
@@ -208,9 +208,9 @@ def _read_array(group: zarr.Group, path: Path, name: str, checksum: str) -> np.n
         with numcodecs_unremarked():
             array = np.asarray(group[name][...])  # type: ignore[index]
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}/{name}: not readable ({error}); {_REMEDY}") from error
+        raise InputError(f"{path}/{name}: not readable ({error}); {REMEDY}") from error
     if _sha256(array) != checksum:
-        raise InputError(f"{path}/{name}: bytes do not match their sha256; {_REMEDY}")
+        raise InputError(f"{path}/{name}: bytes do not match their sha256; {REMEDY}")
     return array
 
 
@@ -218,7 +218,7 @@ def _open(path: Path) -> zarr.Group:
     try:
         return zarr.open_group(zarr.storage.LocalStore(path, read_only=True), mode="r", zarr_format=3)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}/zarr.json: not readable ({error}); {_REMEDY}") from error
+        raise InputError(f"{path}/zarr.json: not readable ({error}); {REMEDY}") from error
 
 
 def _sha256(array: np.ndarray) -> str:

@@ -209,7 +209,7 @@ def test_content_hash_follows_content_and_not_place(tmp_path, make_sample):
 
 def test_a_baseline_keeps_versions_and_numbers_alone(folders):
     result = compare(folders / "good", folders / "truth").to_dict()
-    found = measured(result, folders / "truth")
+    found = measured(result)
     assert found.origin == provenance(folders / "truth")
     assert found.figures["vertex_error_mm.mean"] == result["vertex_error_mm"]["mean"]
     assert found.figures["velocity_error_mm_s"] is None

@@ -178,3 +178,12 @@ def test_meshes_without_correspondence_have_normals_of_nearest_points(tmp_path):
     figures = compare(tmp_path / "a.obj", tmp_path / "b.obj", metrics=["normals"]).figures
     assert figures["normal_error_deg"] is None
     assert figures["normal_distance_deg"] == pytest.approx(np.degrees(np.arctan(0.2)), abs=1e-6)
+
+
+def test_a_prediction_without_area_has_null_surface_distances(score, make_sample):
+    truth = make_sample("a", n=5)
+    found = score(truth, moved(truth, lambda x: x * [1.0, 1.0, 0.0]), metrics=["vertex", "surface"])
+    assert found.figures["hausdorff_mm"] is None
+    assert found.pairs[0].figures["mean_surface_distance_mm"] is None
+    assert found.figures["vertex_error_mm"]["max"] > 0.0
+    assert any("surface distances are null" in note and "area" in note for note in found.notes)
