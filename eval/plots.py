@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -33,7 +33,8 @@ Line = tuple[Sequence[float], Sequence[float]]
 
 def line_plot(lines: Mapping[str, Line], x_label: str, y_label: str, points: bool = False) -> str:
     """SVG of named lines (x, y); with `points` every value gets a dot. The y axis starts at zero."""
-    with mpl.rc_context(STYLE):
+
+    def draw() -> Figure:
         figure = Figure(figsize=(5.4, 3.1), layout="constrained")
         axes = figure.add_subplot()
         for (name, (x, y)), colour in zip(lines.items(), COLOURS * (1 + len(lines) // 6), strict=False):
@@ -45,42 +46,50 @@ def line_plot(lines: Mapping[str, Line], x_label: str, y_label: str, points: boo
         axes.grid(alpha=0.15, color=INK)
         if 1 < len(lines) <= 12:
             axes.legend(fontsize=8)
-        return page_svg(figure)
+        return figure
+
+    return page_svg(draw)
 
 
 def bar_plot(names: Sequence[str], values: Sequence[float], x_label: str) -> str:
     """SVG of horizontal bars, the first on top."""
-    with mpl.rc_context(STYLE):
+
+    def draw() -> Figure:
         figure = Figure(figsize=(5.4, 0.7 + 0.26 * len(names)), layout="constrained")
         axes = figure.add_subplot()
         axes.barh(range(len(names)), values, color=COLOURS[0], height=0.7)
         axes.set_yticks(range(len(names)), names, fontsize=8)
         axes.invert_yaxis()
         axes.set_xlabel(x_label)
-        return page_svg(figure)
+        return figure
+
+    return page_svg(draw)
 
 
-def page_svg(figure: Figure) -> str:
-    """SVG for a page: without size or background, in the colour of its text. Drawn within `STYLE`."""
-    return inline_svg(_svg(figure)).replace(INK, "currentColor")
+def page_svg(draw: Callable[[], Figure]) -> str:
+    """SVG for a page: without size or background, in the colour of its text. What is drawn has `STYLE`."""
+    return inline_svg(_svg(draw)).replace(INK, "currentColor")
 
 
-def file_svg(figure: Figure) -> bytes:
-    """SVG for a file of its own, black on nothing. Drawn within `STYLE`."""
-    return _svg(figure).replace(INK, "#000000").encode()
+def file_svg(draw: Callable[[], Figure]) -> bytes:
+    """SVG for a file of its own, black on nothing."""
+    return _svg(draw).replace(INK, "#000000").encode()
 
 
-def file_png(figure: Figure, title: str) -> bytes:
-    """PNG on white, with a title. Drawn within `STYLE`."""
-    figure.suptitle(title, fontsize=10)
+def file_png(draw: Callable[[], Figure], title: str) -> bytes:
+    """PNG on white, with a title."""
     stream = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(stream)
+    with mpl.rc_context(STYLE):
+        figure = draw()
+        figure.suptitle(title, fontsize=10)
+        FigureCanvasAgg(figure).print_png(stream)
     return stream.getvalue()
 
 
-def _svg(figure: Figure) -> str:
+def _svg(draw: Callable[[], Figure]) -> str:
     stream = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})
+    with mpl.rc_context(STYLE):
+        FigureCanvasSVG(draw()).print_svg(stream, metadata={"Date": None})
     return stream.getvalue()
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from muslin.eval.bench.curves import Curve, Plot
-from muslin.eval.plots import COLOURS, INK, STYLE, file_png, file_svg, page_svg
+from muslin.eval.plots import COLOURS, INK, file_png, file_svg, page_svg
 
 DASHES = ("-", "--", ":", "-.")
 MARKERS = "os^Dv"
@@ -17,20 +16,17 @@ MOST_DOTS = 40  # more points than these are a line without dots
 
 def plot_svg(plot: Plot) -> str:
     """SVG for a page, see `page_svg`."""
-    with mpl.rc_context(STYLE):
-        return page_svg(_figure(plot))
+    return page_svg(lambda: _figure(plot))
 
 
 def plot_svg_file(plot: Plot) -> bytes:
     """SVG for a file of its own."""
-    with mpl.rc_context(STYLE):
-        return file_svg(_figure(plot))
+    return file_svg(lambda: _figure(plot))
 
 
 def plot_png(plot: Plot) -> bytes:
     """PNG on white, with its title."""
-    with mpl.rc_context(STYLE):
-        return file_png(_figure(plot), plot.title)
+    return file_png(lambda: _figure(plot), plot.title)
 
 
 def _figure(plot: Plot) -> Figure:

@@ -63,7 +63,7 @@ class SelfContactSummary:
 
 @dataclass
 class ContactAccumulator:
-    """Collects frames of contact; merge two by adding their lists."""
+    """Collects frames of contact."""
 
     body: list[BodyContact] = field(default_factory=list)
     own: list[SelfContact] = field(default_factory=list)
@@ -73,6 +73,11 @@ class ContactAccumulator:
             self.body.append(body)
         if own is not None:
             self.own.append(own)
+
+    def merge(self, other: ContactAccumulator) -> None:
+        """Add the frames of another."""
+        self.body += other.body
+        self.own += other.own
 
     def body_result(self) -> BodyContactSummary | None:
         """None if no frame came."""

@@ -27,14 +27,22 @@ OPEN_BODY = (
 )
 
 
-class BodyContact(Family):
-    """Both sides against one body: that of the truth, if it has one."""
-
-    name, what = "body-contact", "penetration and intersections with the body are"
+class BothSides(Family):
+    """Contacts of the prediction and of the truth."""
 
     def __init__(self, pair: Pair) -> None:
         super().__init__(pair)
         self.sides = {"prediction": ContactAccumulator(), "truth": ContactAccumulator()}
+
+    def merge(self, other: Self) -> None:
+        for side, kept in self.sides.items():
+            kept.merge(other.sides[side])
+
+
+class BodyContact(BothSides):
+    """Both sides against one body: that of the truth, if it has one."""
+
+    name, what = "body-contact", "penetration and intersections with the body are"
 
     def update(self, frame: PairFrame) -> None:
         if frame.body is None or frame.pair.body is None:
@@ -49,10 +57,6 @@ class BodyContact(Family):
             self.sides[side].update(body=found)
             if found.method == PSEUDONORMAL and OPEN_BODY not in self.notes:
                 self.notes.append(OPEN_BODY)
-
-    def merge(self, other: Self) -> None:
-        for side, kept in self.sides.items():
-            kept.body += other.sides[side].body
 
     def figures(self) -> dict[str, Any]:
         results = {side: kept.body_result() for side, kept in self.sides.items()}
@@ -71,22 +75,14 @@ class BodyContact(Family):
         }
 
 
-class SelfContact(Family):
+class SelfContact(BothSides):
     """Each side against itself."""
 
     name, what = "self-contact", "intersections of the cloth with itself are"
 
-    def __init__(self, pair: Pair) -> None:
-        super().__init__(pair)
-        self.sides = {"prediction": ContactAccumulator(), "truth": ContactAccumulator()}
-
     def update(self, frame: PairFrame) -> None:
         self.sides["prediction"].update(own=self_contact(frame.predicted, frame.predicted_faces))
         self.sides["truth"].update(own=self_contact(frame.true, frame.true_faces))
-
-    def merge(self, other: Self) -> None:
-        for side, kept in self.sides.items():
-            kept.own += other.sides[side].own
 
     def figures(self) -> dict[str, Any]:
         return {

@@ -67,15 +67,12 @@ class PairFrame:
         """The truth's mesh with its panels. UnavailableError if not known."""
         return _garment(self.pair.truth.garments, self.t, "the truth")
 
-    def window(self, length: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """The last `length` frames, this one included, of both sides at the truth's vertices of this frame.
+    def window(self) -> tuple[np.ndarray, np.ndarray]:
+        """The last frames, this one included, of both sides at the truth's vertices of this frame.
 
-        (length, V, 3) each, metres; None if there are not yet so many. UnavailableError as for `seen`.
+        (n, V, 3) each, metres, n at most `MOST_EARLIER` + 1. UnavailableError as for `seen`.
         """
-        if length - 1 > len(self._earlier):
-            return None
-        frames = [*self._earlier[len(self._earlier) - length + 1 :], self]
-        predicted, true = zip(*(self._carried(frame) for frame in frames), strict=True)
+        predicted, true = zip(*(self._carried(frame) for frame in (*self._earlier, self)), strict=True)
         return np.stack(predicted), np.stack(true)
 
     def forget(self) -> None:

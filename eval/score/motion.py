@@ -32,18 +32,15 @@ class Motion(Family):
     def update(self, frame: PairFrame) -> None:
         if frame.pair.truth.num_frames < 2:
             raise UnavailableError(ONE_FRAME)
+        predicted, true = frame.window()
         for order in ORDERS:
-            window = frame.window(order + 1)
-            if window is None:
+            if order >= len(true):
                 return
-            self.errors[order].update(derivative_errors(*window, frame.fps, order)[0])
-        assert window is not None
-        self.jerks.add(
-            **{
-                side: float(np.mean(jerk_sizes(x, frame.fps)))
-                for side, x in zip(("prediction", "truth"), window, strict=True)
-            }
-        )
+            last = slice(-order - 1, None)
+            errors = derivative_errors(predicted[last], true[last], frame.fps, order)
+            self.errors[order].update(errors[0])
+        sides = {"prediction": predicted, "truth": true}
+        self.jerks.add(**{side: float(np.mean(jerk_sizes(x, frame.fps))) for side, x in sides.items()})
 
     def merge(self, other: Self) -> None:
         for order in ORDERS:

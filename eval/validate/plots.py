@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from muslin.eval.plots import COLOURS, INK, STYLE, file_png, page_svg
+from muslin.eval.plots import COLOURS, INK, file_png, page_svg
 from muslin.eval.validate.case import Plot
 
 MARKERS = "osD^vP"
@@ -13,14 +12,12 @@ MARKERS = "osD^vP"
 
 def plot_svg(plot: Plot) -> str:
     """SVG for a page, see `page_svg`."""
-    with mpl.rc_context(STYLE):
-        return page_svg(_figure(plot))
+    return page_svg(lambda: _figure(plot))
 
 
 def plot_png(plot: Plot) -> bytes:
     """PNG on white, with its caption as title."""
-    with mpl.rc_context(STYLE):
-        return file_png(_figure(plot), plot.caption)
+    return file_png(lambda: _figure(plot), plot.caption)
 
 
 def _figure(plot: Plot) -> Figure:
