@@ -12,9 +12,9 @@ from muslin.sim.body.load import load_body
 from muslin.sim.cloth import build_cloth
 from muslin.sim.device import open_device
 from muslin.sim.motion.arms import spread_arms
-from muslin.sim.motion.clips import load_motion
 from muslin.sim.motion.grounding import fit_to_body
 from muslin.sim.motion.lead_in import lead_in
+from muslin.sim.motion_table import read_motion
 from muslin.sim.relax import settle
 from muslin.sim.run import cut_garment
 from muslin.sim.scene import load_scene
@@ -44,12 +44,12 @@ def make_setting(frames: int, edge_length: float | None = None, scene_file: str 
     cloth = build_cloth(mesh, fabric)
     model = load_body(scene.body.model)
     beta = np.zeros(model.num_betas)
-    clip = fit_to_body(load_motion(scene.motion.clip), model, beta)
+    clip = fit_to_body(read_motion(scene.motion), model, beta)
     clip, _ = spread_arms(clip.clip(scene.motion.start, scene.motion.end or clip.duration), model, beta)
     times = from_rest(DT * np.arange(frames + 1, dtype=np.float64))
     if times[-1] > clip.duration:
         most = int((clip.duration + 0.5 * START_SECONDS) / DT)
-        raise ValueError(f"frames = {frames}: {scene.motion.clip} of {scene_file} has {most}")
+        raise ValueError(f"frames = {frames}: {scene.motion.usual_name} of {scene_file} has {most}")
 
     contact, solver = settings_of(scene)
     worn = WornGarment([mesh], [cloth], model, beta, contact, solver, "cpu")

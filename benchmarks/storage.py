@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 import time
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,10 +136,11 @@ def _add(row: Row, truth: np.ndarray, positions: np.ndarray) -> None:
 def _on_disk(dataset: Dataset) -> dict[str, int]:
     sizes: dict[str, int] = {}
     for sample_id in dataset.ids:
-        folder = store.sample_path(dataset.root, sample_id)
-        for file in (p for p in folder.rglob("*") if p.is_file()):
-            name = "attributes" if file.name == "zarr.json" else file.relative_to(folder).parts[0]
-            sizes[name] = sizes.get(name, 0) + file.stat().st_size
+        packed = io.BytesIO(dataset.root.read(store.sample_name(sample_id)))
+        with zipfile.ZipFile(packed) as archive:
+            for entry in archive.infolist():
+                name = "attributes" if entry.filename.endswith("zarr.json") else entry.filename.split("/")[0]
+                sizes[name] = sizes.get(name, 0) + entry.file_size
     return sizes
 
 

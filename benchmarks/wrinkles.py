@@ -25,7 +25,7 @@ from muslin.eval.metrics.panel_spectrum import PANEL_BAND_EDGES, panel_energies,
 from muslin.eval.metrics.spectrum import band_energies, curvature_normals, spectrum_score
 from muslin.eval.metrics.strain import green_strain, percentiles
 from muslin.eval.metrics.vertex import statistics, triangle_areas, vertex_areas, vertex_errors
-from muslin.sim.dataset.store import read_sample, stored_ids
+from muslin.sim.dataset.reader import open_dataset
 
 AMOUNTS = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Of smoothing, m^2: heights of a wave shrink by 1 / (1 + amount (2 pi / wavelength)^2)."""
@@ -59,7 +59,7 @@ class Drape:
     """The last frame of the first sample of a dataset, and all metrics of this table on it."""
 
     def __init__(self, path: Path) -> None:
-        sample = read_sample(path, stored_ids(path)[0])
+        sample = open_dataset(path)[0]
         last = sample.num_frames - 1
         self.mesh = sample.frame_garment(last)
         self.truth = sample.frame_positions(last).astype(np.float64)

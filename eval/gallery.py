@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
 from muslin.sim.dataset import store
 from muslin.sim.dataset.processes import in_processes, usable_cores
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.view.camera import Camera
 from muslin.sim.view.lighting import DRAFT, FINE
@@ -26,7 +26,7 @@ Progress = Callable[[float, int, str], None]
 class Shot:
     """One picture to draw: a frame of a sample; with `frames` as one of that movie."""
 
-    root: Path
+    root: Root
     sample_id: str
     frame: int = 0
     frames: tuple[int, ...] = ()
@@ -55,10 +55,10 @@ def _draw(shot: Shot) -> np.ndarray:
 
 
 @lru_cache(maxsize=2)
-def _cameras(root: Path, sample_id: str, frames: tuple[int, ...]) -> tuple[list[Camera], float]:
+def _cameras(root: Root, sample_id: str, frames: tuple[int, ...]) -> tuple[list[Camera], float]:
     return sample_cameras(_sample(root, sample_id), frames, MOVIE_SIZE)
 
 
 @lru_cache(maxsize=2)
-def _sample(root: Path, sample_id: str) -> Sample:
+def _sample(root: Root, sample_id: str) -> Sample:
     return store.read_sample(root, sample_id)

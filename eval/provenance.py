@@ -11,6 +11,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.root import open_root
 from muslin.sim.dataset.schema import HEADER, SAMPLES, SUFFIX
 
 METRICS_VERSION = 1
@@ -42,7 +43,7 @@ def content_hash(path: str | Path) -> str:
         return digest({row["id"]: [row[name] for name in columns] for row in open_dataset(root).rows})
     if root.name.endswith(SUFFIX) and root.parent.name == SAMPLES:
         sample_id = root.name.removesuffix(SUFFIX)
-        meta, checksums = store.read_meta(root.parent.parent, sample_id)
+        meta, checksums = store.read_meta(open_root(root.parent.parent), sample_id)
         return digest([sample_id, meta["fps"], meta["body"], checksums])
     files = [root] if root.is_file() else sorted(file for file in root.rglob("*") if file.is_file())
     if not files:

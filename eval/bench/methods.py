@@ -13,6 +13,7 @@ from muslin.eval.read.subject import open_subject
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.root import open_root
 from muslin.sim.dataset.schema import HEADER
 
 
@@ -72,13 +73,13 @@ def open_method(name: str, path: Path, truth: Path, ids: Sequence[str]) -> Metho
 
 def _of_dataset(path: Path, truth: Path, ids: Sequence[str]) -> dict[str, Path]:
     own = set(open_dataset(path).ids)
-    found = {i: store.sample_path(path, i) for i in ids if i in own}
+    found = {i: store.sample_file(path, i) for i in ids if i in own}
     lacking = [i for i in ids if i not in own]
-    spare = own - set(store.stored_ids(truth))
+    spare = own - set(store.stored_ids(open_root(truth)))
     if lacking and spare:
         theirs = _only_ones(open_subject(path).keys, spare)
         ours = _only_ones(open_subject(truth).keys, lacking)
-        found |= {ours[key]: store.sample_path(path, theirs[key]) for key in ours.keys() & theirs.keys()}
+        found |= {ours[key]: store.sample_file(path, theirs[key]) for key in ours.keys() & theirs.keys()}
     return found
 
 

@@ -58,7 +58,7 @@ def bench(
             name,
             i,
             method.predictions[i],
-            store.sample_path(truth, i),
+            store.sample_file(truth, i),
             None if method.is_dataset else entry.fps,
             tuple(protocol.families),
             protocol.surface_frames,

@@ -38,7 +38,7 @@ def worst_median_best(outcome: Outcome, ids: Sequence[str]) -> dict[str, str]:
 
 
 def _scene(outcome: Outcome, sample: str, name: str) -> Scene:
-    truth = open_subject(store.sample_path(outcome.truth, sample)).load(sample)
+    truth = open_subject(store.sample_file(outcome.truth, sample)).load(sample)
     predictions = {}
     for key, method in outcome.methods.items():
         subject = open_subject(method.predictions[sample], None if method.is_dataset else truth.fps)

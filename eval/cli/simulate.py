@@ -47,7 +47,8 @@ def simulate(
         if error.state is None:
             raise
         kept = out.with_name(f"{out.name}.last_good.npz")
-        error.state.save(kept)
+        with kept.open("wb") as stream:
+            error.state.save(stream)
         raise SimulationError(f"{error}; the last good state is in {kept}", error.state) from error
     write_dataset(out, [sample], config=loaded.model_dump(mode="json"))
     found = sample.certificate

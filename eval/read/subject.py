@@ -16,6 +16,7 @@ from muslin.eval.read.track import Frames, MovingSurface, Track
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.dataset.schema import HEADER, SAMPLES, SUFFIX
 
@@ -97,13 +98,12 @@ def matched(prediction: Subject, truth: Subject) -> tuple[list[tuple[str, str]],
     return pairs, [i for i in prediction.ids if i not in first], [i for i in truth.ids if i not in second]
 
 
-def _dataset(root: Path) -> Subject:
-    dataset = open_dataset(root)
+def _dataset(path: Path) -> Subject:
+    dataset = open_dataset(path)
     if not len(dataset):
-        raise InputError(f"{root}: the dataset holds no sample; run `muslin generate` first")
-    return Subject(
-        root, dataset.ids, {i: _key(root, i) for i in dataset.ids}, lambda i: _sample_track(dataset[i])
-    )
+        raise InputError(f"{path}: the dataset holds no sample; run `muslin generate` first")
+    keys = {i: _key(dataset.root, i) for i in dataset.ids}
+    return Subject(path, dataset.ids, keys, lambda i: _sample_track(dataset[i]))
 
 
 def _sample_track(sample: Sample) -> Track:
@@ -127,7 +127,7 @@ def _sample_track(sample: Sample) -> Track:
     )
 
 
-def _key(root: Path, sample_id: str) -> tuple[Any, ...]:
+def _key(root: Root, sample_id: str) -> tuple[Any, ...]:
     meta, arrays = store.read_meta(root, sample_id)
     beta = store.read_array(root, sample_id, "beta") if "beta" in arrays else np.zeros(0)
     garment = meta["garment"]

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import os
 from itertools import count
-from pathlib import Path
 
-from muslin.sim.dataset import durable, store
-from muslin.sim.dataset.schema import FAILED
+from muslin.sim.dataset import store
+from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.schema import FAILED, SUFFIX
 
 
-def set_aside(root: Path, sample_id: str) -> Path | None:
-    """Move what lies in the place of a sample to `failed/ID.zarr-N`, N the first number that is free.
+def set_aside(root: Root, sample_id: str) -> str | None:
+    """Move the file of a sample to `failed/ID.zarr.zip-N`, N the first number that is free.
 
     Returns the new place, or None if nothing lay there. The caller holds the lock of the dataset.
     """
-    path = store.sample_path(root, sample_id)
-    if not os.path.lexists(path):
+    name = store.sample_name(sample_id)
+    if not root.exists(name):
         return None
-    durable.make_folder(root / FAILED)
-    places = (root / FAILED / f"{path.name}-{n}" for n in count(1))
-    place = next(free for free in places if not os.path.lexists(free))
-    durable.move(path, place)
-    return place
+    taken = set(root.names(FAILED))
+    free = next(place for n in count(1) if (place := f"{sample_id}{SUFFIX}-{n}") not in taken)
+    root.move(name, f"{FAILED}/{free}")
+    return root.place(f"{FAILED}/{free}")

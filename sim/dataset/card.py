@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from muslin.sim.dataset import durable, licences
+from muslin.sim.dataset import licences
 from muslin.sim.dataset.header import Header, digest
 from muslin.sim.dataset.jobs import Job
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.schema import CARD
 from muslin.sim.dataset.toml_text import toml_text
 
@@ -23,17 +24,16 @@ BINS = 12
 Table = Sequence[Sequence[object]]
 
 
-def write_card(root: Path, header: Header, rows: Sequence[Mapping[str, Any]], jobs: Iterable[Job]) -> bool:
+def write_card(root: Root, header: Header, rows: Sequence[Mapping[str, Any]], jobs: Iterable[Job]) -> bool:
     """Write the card of a dataset. False, and nothing written, if README.md is there and not a card."""
-    path = root / CARD
     try:
-        if not path.read_bytes().startswith(MARK.encode()):
+        if not root.read(CARD).startswith(MARK.encode()):
             return False
     except FileNotFoundError:
         pass
     except IsADirectoryError:
         return False
-    durable.write_file(path, card_text(header, rows, jobs).encode())
+    root.write(CARD, card_text(header, rows, jobs).encode())
     return True
 
 

@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 import zarr
-from zarr.codecs import BloscCname, BloscCodec, BloscShuffle, Crc32cCodec, ShardingCodec
+from zarr.codecs import BloscCname, BloscCodec, BloscShuffle, Crc32cCodec
 from zarr.codecs.numcodecs import PCodec
-from zarr.core.array import Array
 from zarr.errors import ZarrUserWarning
 
 from muslin.sim.dataset.schema import ArraySpec, chunk_rows
@@ -49,13 +48,6 @@ def create_array(group: zarr.Group, name: str, array: np.ndarray, spec: ArraySpe
             attributes={"meaning": spec.meaning},
             **form,
         )
-
-
-def checks_chunks(array: Array) -> bool:
-    """Whether every chunk of an array carries a checksum."""
-    codecs = array.metadata.codecs  # type: ignore[union-attr]
-    inner = [c for codec in codecs for c in (codec.codecs if isinstance(codec, ShardingCodec) else (codec,))]
-    return any(isinstance(codec, Crc32cCodec) for codec in inner)
 
 
 @contextmanager

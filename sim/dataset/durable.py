@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,36 +22,24 @@ def make_folder(path: Path) -> None:
 def write_file(path: Path, data: bytes) -> None:
     """Replace a file in one step: readers see the old bytes or the new ones, never a part."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    with partial.open("wb") as stream:
+    write_through(partial, data)
+    os.replace(partial, path)
+    sync(path.parent)
+
+
+def write_through(path: Path, data: bytes) -> None:
+    """Write a file and wait until the disk has it."""
+    with path.open("wb") as stream:
         stream.write(data)
         stream.flush()
         os.fsync(stream.fileno())
-    os.replace(partial, path)
-    _sync(path.parent)
-
-
-def commit_directory(partial: Path, final: Path) -> bool:
-    """Move a finished folder to its place. False, and `partial` removed, if something is there already."""
-    for folder, _, files in os.walk(partial):
-        for name in files:
-            _sync(Path(folder, name))
-        _sync(Path(folder))
-    try:
-        os.replace(partial, final)
-    except OSError as error:
-        if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-            raise
-        shutil.rmtree(partial)
-        return False
-    _sync(final.parent)
-    return True
 
 
 def move(path: Path, place: Path) -> None:
     """Move a file or folder to a place of the same file system where nothing lies."""
     os.rename(path, place)
-    _sync(path.parent)
-    _sync(place.parent)
+    sync(path.parent)
+    sync(place.parent)
 
 
 @contextmanager
@@ -72,7 +58,8 @@ def exclusive(lock: Path) -> Iterator[None]:
         yield
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Wait until the disk has a file, or the names in a folder."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,38 +1,32 @@
-"""Make the samples of a dataset over local processes; stop at any moment, run again, and it goes on."""
+"""Make the samples of a dataset over many processes; stop at any moment, run again, and it goes on."""
 
 from __future__ import annotations
 
-import multiprocessing
-import queue
 import time
-from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable, store
+from muslin.sim.dataset import store
 from muslin.sim.dataset.aside import set_aside
 from muslin.sim.dataset.card import write_card
 from muslin.sim.dataset.config import DatasetConfig
+from muslin.sim.dataset.engine import Cluster, Died, Done, Engine, News, open_engine
 from muslin.sim.dataset.header import Header, prepare_root
-from muslin.sim.dataset.index import read_index, write_index
-from muslin.sim.dataset.jobs import Plan
+from muslin.sim.dataset.index import read_index, stored_rows, write_index
+from muslin.sim.dataset.jobs import Chain, Plan
 from muslin.sim.dataset.plan import plan
-from muslin.sim.dataset.processes import one_thread_each, usable_cores, worker_died
-from muslin.sim.dataset.schema import LOCK
+from muslin.sim.dataset.progress import Progress, Tally
+from muslin.sim.dataset.quarantine import Quarantined, quarantine, quarantined_ids, release, state_name
+from muslin.sim.dataset.root import Root, open_root
 from muslin.sim.dataset.solver import solver_digest
 from muslin.sim.dataset.sources import check_sources
-from muslin.sim.dataset.worker import ChainSimulator, Task, make_chain, start_worker
+from muslin.sim.dataset.worker import ChainSimulator, Made, Task, make_chain
 
-
-class Progress(Protocol):
-    """What `generate` tells while it runs."""
-
-    def __call__(self, done: float, total: int, message: str) -> None:
-        """done: samples made, with the begun ones in parts; total: samples to make."""
+INDEX_S = 120.0
+"""Between two writings of the index while samples are made."""
 
 
 @dataclass(frozen=True)
@@ -40,50 +34,59 @@ class GenerateReport:
     """What `generate` did.
 
     made, kept   ids in plan order; `kept` were there already
-    failed       {id: reason}
+    failed       {id: reason} of what could not be made in this run
+    held         ids in quarantine since an earlier run, and those behind them in their chains: not tried
     aside        {id: place} of what was set aside to be made again
     card         False if README.md is not the dataset's card but somebody's own, and was left as it is
+    busy         seconds that workers were at it, in all
     """
 
     made: tuple[str, ...]
     kept: tuple[str, ...]
     failed: dict[str, str] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
     seconds: float = 0.0
-    aside: dict[str, Path] = field(default_factory=dict)
+    busy: float = 0.0
+    aside: dict[str, str] = field(default_factory=dict)
     card: bool = True
 
 
 def generate(
     config: DatasetConfig,
-    out: str | Path,
+    out: str | Path | Root,
     *,
     workers: int | None = None,
+    cluster: Cluster | None = None,
     device: str = "cpu",
     progress: Progress | None = None,
     simulate: ChainSimulator | None = None,
     make_scene: Callable[[dict[str, Any]], Any] | None = None,
     again: Collection[str] = (),
+    retry: bool = False,
 ) -> GenerateReport:
     """Make every planned sample that is not there yet.
 
-    The same configuration gives the same ids and, on one machine, the same bytes of geometry, whatever the
-    number of workers and however often the run was killed: a sample is committed whole or not at all, and a
-    chain of drapes of which any is missing is made again from its start.
+    The same configuration gives the same ids and, on one kind of machine, the same bytes of geometry,
+    whatever the workers, their number, order and deaths, and however often the run was killed: a sample
+    is committed whole or not at all, and a chain of drapes of which any is missing is made again from its
+    start.
 
-    workers      processes; by default one a usable core on the CPU, one on a GPU
+    out          folder, or a URL that fsspec knows; with workers on other machines, one that all reach
+    workers      short for Cluster(workers=workers)
+    cluster      which workers do it; by default one a usable core on the CPU, one on a GPU
     simulate     `muslin.sim.run.simulate_chain` unless given
     make_scene   from the values of a scene file to a scene; `muslin.sim.scene.parse_scene` unless given
     again        ids of samples to make again: once nothing stands in the way of that, what is there of them
                  is moved to `failed/`
+    retry        try samples in quarantine again
 
-    A chain that fails is reported in `failed`; the others go on. Raises InputError for a configuration or a
-    scene that cannot be or names what is not there, for a folder that may not be written to (see
-    `prepare_root`), and when a process dies.
+    A sample that fails, or whose worker dies time after time, goes into quarantine (`failed/ID.json`), with
+    the rest of its chain; the others go on. Raises InputError for a configuration or a scene that cannot be
+    or names what is not there, and for a place that may not be written to (see `prepare_root`).
     """
-    root = Path(out)
+    root = open_root(out)
     started = time.perf_counter()
-    if workers is not None and workers < 1:
-        raise InputError(f"workers = {workers}: must be 1 or more")
+    where = cluster or Cluster(workers=workers or (None if device == "cpu" else 1))
     planned = plan(config)
     strangers = sorted(set(again) - planned.splits.keys())
     if strangers:
@@ -92,13 +95,11 @@ def generate(
             f"again from it ({len(strangers)} in all); restore them from a copy, or take them out of the "
             "dataset"
         )
-    scenes = _scenes(planned, make_scene or _default_make_scene())
-    if make_scene is None:
-        check_sources(scene for chain in scenes for scene in chain)
+    _check_scenes(planned, make_scene)
     solver = solver_digest(simulate)
     header = Header(config=config.model_dump(mode="json"), splits=planned.splits, solver_digest=solver)
     before = prepare_root(root, header)
-    with durable.exclusive(root / LOCK):
+    with root.lock():
         stored = store.stored_ids(root)
         there = {sample_id for sample_id in stored if sample_id not in again}
         missing = frozenset(job.id for job in planned.jobs if job.id not in there)
@@ -108,23 +109,131 @@ def generate(
         if before is not None and not missing:
             header = replace(header, solver_digest=before.solver_digest, versions=before.versions)
         header.write(root)
-        store.clean_partial(root)
-        todo = [
-            Task(k, root, chain, chain_scenes, missing, header.versions, device, simulate)
-            for k, (chain, chain_scenes) in enumerate(zip(planned.chains, scenes, strict=True))
+        root.clean()
+        held = quarantined_ids(root) & missing
+        release(root, [sample_id for sample_id in sorted(held) if retry or sample_id in again])
+        held = frozenset() if retry else held - set(again)
+        tasks = [
+            Task(root, chain, missing, header.versions, solver, device, simulate, make_scene)
+            for chain in planned.chains
             if any(job.id in missing for job in chain.jobs)
         ]
-        failed = _run(todo, workers, device, progress or _silent) if todo else {}
-        store.clean_partial(root)
-        write_index(root, header)
+        todo = [task for task in tasks if held.isdisjoint(job.id for job in task.wanted)]
+        known = {row_id: row for row_id, row in _known_rows(root).items() if row_id in there}
+        run = _Run(root, header, known, Tally(root, sum(len(task.wanted) for task in todo), progress))
+        if todo:
+            run.over(where, todo)
+        root.clean()
+        write_index(root, header, run.rows)
         card = write_card(root, header, read_index(root, header), planned.jobs)
-    made = tuple(job.id for job in planned.jobs if job.id in missing and job.id not in failed)
-    kept = tuple(job.id for job in planned.jobs if job.id in there)
-    aside = {sample_id: place for sample_id, place in places.items() if place is not None}
-    return GenerateReport(made, kept, failed, time.perf_counter() - started, aside, card)
+    order = [job.id for job in planned.jobs]
+    skipped = {job.id for task in tasks if task not in todo for job in task.wanted}
+    return GenerateReport(
+        made=tuple(i for i in order if i in missing and i in run.rows),
+        kept=tuple(i for i in order if i in there),
+        failed=run.failed,
+        held=tuple(i for i in order if i in skipped),
+        seconds=time.perf_counter() - started,
+        busy=run.busy,
+        aside={sample_id: place for sample_id, place in places.items() if place is not None},
+        card=card,
+    )
 
 
-def _check_solver(root: Path, before: Header | None, header: Header, missing: bool, there: bool) -> None:
+class _Run:
+    """One run over the missing chains. rows: {id: index row} of what is there; failed: {id: reason}."""
+
+    def __init__(self, root: Root, header: Header, rows: Mapping[str, dict[str, Any]], tally: Tally) -> None:
+        self.root, self.header, self.tally = root, header, tally
+        self.rows = dict(rows)
+        self.failed: dict[str, str] = {}
+        self.busy = 0.0
+
+    def over(self, cluster: Cluster, todo: Sequence[Task]) -> None:
+        if cluster.scheduler is None and any(task.simulate is None for task in todo):
+            self.tally.stage("compiling kernels")
+            from muslin.sim.compile import compile_once
+
+            compile_once(todo[0].device)
+        # Sequences first: a long one begun last would leave the other cores idle.
+        order = sorted(todo, key=lambda task: task.chain.jobs[0].kind != "sequence")
+        self.tally.stage("starting workers")
+        if cluster.scheduler is None and cluster.workers is not None:
+            cluster = replace(cluster, workers=min(cluster.workers, len(order)))
+        with open_engine(cluster) as engine:
+            self.tally.open(engine.dashboard)
+            self._follow(engine, order)
+
+    def _follow(self, engine: Engine, order: Sequence[Task]) -> None:
+        written = time.monotonic()
+        try:
+            for event in engine.run(make_chain, order):
+                if isinstance(event, Done):
+                    self._finished(event.place, order[event.place], event.found)
+                elif isinstance(event, News):
+                    self.tally.news(event.place, *event.said, len(order[event.place].wanted))
+                else:
+                    self.tally.tick()
+                if time.monotonic() - written > INDEX_S:
+                    write_index(self.root, self.header, self.rows)
+                    written = time.monotonic()
+        except BaseException:
+            # However it ends, what was made is listed, so that nobody has to read it all to know.
+            write_index(self.root, self.header, self.rows)
+            self.tally.end("stopped")
+            raise
+        self.tally.end("finished")
+
+    def _finished(self, place: int, task: Task, found: Made | Died) -> None:
+        wanted = [job.id for job in task.wanted]
+        if isinstance(found, Died):
+            rest = [i for i in wanted if not self.root.exists(store.sample_name(i))]
+            if rest:
+                self._fail(task, rest, rest[0], found.reason, found.log)
+            self.tally.finished(place, len(wanted) - len(rest), len(rest))
+            return
+        self.busy += found.seconds
+        self.rows |= {row["id"]: row for row in found.rows}
+        rest = wanted[len(found.rows) :]
+        if found.failed:
+            self._fail(task, rest, found.failed, found.reason, found.log)
+        self.tally.finished(place, len(found.rows), len(rest))
+
+    def _fail(
+        self, task: Task, rest: Sequence[str], sample_id: str, reason: str, log: tuple[str, ...]
+    ) -> None:
+        """Put the first of `rest` into quarantine; the others fail with it."""
+        quarantine(self.root, _entry(self.root, task.chain, sample_id, reason, log, task.versions))
+        self.failed[sample_id] = reason
+        for behind in rest[1:]:
+            self.failed[behind] = f"comes after {sample_id} in its chain: {reason}"
+
+
+def _entry(
+    root: Root, chain: Chain, sample_id: str, reason: str, log: tuple[str, ...], versions: dict[str, str]
+) -> Quarantined:
+    place = next(k for k, job in enumerate(chain.jobs) if job.id == sample_id)
+    state = state_name(sample_id)
+    return Quarantined(
+        id=sample_id,
+        reason=reason.splitlines()[0],
+        log=log,
+        command=f"muslin repair {root} --sample {sample_id} --workers 1",
+        seed=chain.jobs[place].seed,
+        scenes=tuple(job.scene for job in chain.jobs[: place + 1]),
+        state=root.place(state) if root.exists(state) else "",
+        versions=versions,
+    )
+
+
+def _known_rows(root: Root) -> dict[str, dict[str, Any]]:
+    try:
+        return stored_rows(root)
+    except InputError:
+        return {}  # a damaged index is written anew, from the samples
+
+
+def _check_solver(root: Root, before: Header | None, header: Header, missing: bool, there: bool) -> None:
     if before is None or not missing or not there or before.solver_digest == header.solver_digest:
         return
     changed = [
@@ -138,77 +247,19 @@ def _check_solver(root: Path, before: Header | None, header: Header, missing: bo
     )
 
 
-def _scenes(planned: Plan, make_scene: Callable[[dict[str, Any]], Any]) -> list[list[Any]]:
-    scenes = []
-    for chain in planned.chains:
-        made = []
-        for job in chain.jobs:
-            try:
-                made.append(make_scene(job.scene))
-            except (InputError, ValueError) as error:
-                raise InputError(f"scene of sample {job.id}: {error}") from error
-        scenes.append(made)
-    return scenes
+def _check_scenes(planned: Plan, make_scene: Callable[[dict[str, Any]], Any] | None) -> None:
+    """Raise InputError for a scene that cannot be, or, of real ones, that names what is not there."""
+    if make_scene is None:
+        from muslin.sim.scene import parse_scene
+
+        check_sources(_scene(job.id, job.scene, parse_scene) for job in planned.jobs)
+        return
+    for job in planned.jobs:
+        _scene(job.id, job.scene, make_scene)
 
 
-def _default_make_scene() -> Callable[[dict[str, Any]], Any]:
-    from muslin.sim.scene import parse_scene
-
-    return parse_scene
-
-
-def _silent(done: float, total: int, message: str) -> None:
-    pass
-
-
-def _run(todo: Sequence[Task], workers: int | None, device: str, progress: Progress) -> dict[str, str]:
-    """Run the chains over processes; return {id: reason} of the samples that could not be made."""
-    usable = usable_cores() if device == "cpu" else 1
-    count = min(workers or usable, len(todo))
-    if any(task.simulate is None for task in todo):
-        progress(0.0, 0, "compiling kernels")
-        from muslin.sim.run import compile_kernels
-
-        compile_kernels(device)
-    context = multiprocessing.get_context("spawn")
-    news: Any = context.Queue()
-    leash, held = context.Pipe(duplex=False)
-    weight = {task.place: len(task.missing.intersection(job.id for job in task.chain.jobs)) for task in todo}
-    parts = dict.fromkeys(weight, 0.0)
-    failed: dict[str, str] = {}
-    with one_thread_each():
-        pool = ProcessPoolExecutor(
-            count, mp_context=context, initializer=start_worker, initargs=(news, leash)
-        )
-        try:
-            # Sequences first: a long one begun last would leave the other cores idle.
-            order = sorted(todo, key=lambda task: task.chain.jobs[0].kind != "sequence")
-            pending: set[Future[dict[str, str]]] = {pool.submit(make_chain, task) for task in order}
-            while pending:
-                finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    failed |= future.result()
-                message = _drain(news, parts)
-                progress(sum(parts[k] * weight[k] for k in weight), sum(weight.values()), message)
-        except BrokenProcessPool as error:
-            raise worker_died(count, "; what was finished is kept") from error
-        except BaseException:
-            held.close()  # ends the workers, whatever they are at
-            raise
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-            held.close()
-            leash.close()
-            news.close()
-    progress(float(sum(weight.values()) - len(failed)), sum(weight.values()), "")
-    return failed
-
-
-def _drain(news: Any, parts: dict[int, float]) -> str:
-    message = ""
-    while True:
-        try:
-            place, part, message = news.get_nowait()
-        except queue.Empty:
-            return message
-        parts[place] = part
+def _scene(sample_id: str, values: dict[str, Any], make_scene: Callable[[dict[str, Any]], Any]) -> Any:
+    try:
+        return make_scene(values)
+    except (InputError, ValueError) as error:
+        raise InputError(f"scene of sample {sample_id}: {error}") from error

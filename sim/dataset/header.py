@@ -8,12 +8,11 @@ import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable
-from muslin.sim.dataset.schema import CARD, FORMAT, HEADER, LOCK, PARTIAL, SAMPLES, SCHEMA_VERSION
+from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.schema import CARD, FORMAT, HEADER, SAMPLES, SCHEMA_VERSION
 
 
 def canonical(value: Any) -> bytes:
@@ -53,23 +52,23 @@ class Header:
     def config_hash(self) -> str:
         return digest(self.config)
 
-    def write(self, root: Path) -> None:
-        durable.write_file(root / HEADER, (json.dumps(asdict(self), indent=1) + "\n").encode())
+    def write(self, root: Root) -> None:
+        root.write(HEADER, (json.dumps(asdict(self), indent=1) + "\n").encode())
 
 
-def read_header(root: Path) -> Header:
+def read_header(root: Root) -> Header:
     """The header of a dataset.
 
     Raises InputError if the folder is no dataset, its header is damaged, or its schema is newer than this
     program.
     """
-    path = root / HEADER
-    if not path.is_file():
+    path = root.place(HEADER)
+    try:
+        values = json.loads(root.read(HEADER))
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise InputError(
             f"{root}: no muslin dataset here ({HEADER} is missing); give the folder of a dataset"
-        )
-    try:
-        values = json.loads(path.read_bytes())
+        ) from error
     except ValueError as error:
         raise InputError(f"{path}: not readable as JSON ({error}); {_RESTORE}") from error
     if not isinstance(values, dict) or values.get("format") != FORMAT:
@@ -82,28 +81,31 @@ def read_header(root: Path) -> Header:
             f"{path}: schema_version = {found} is newer than {SCHEMA_VERSION}, the newest that this "
             "program reads; update muslin (pip install -U muslin)"
         )
+    if found < SCHEMA_VERSION:
+        raise InputError(
+            f"{path}: schema_version = {found} is older than {SCHEMA_VERSION}, the oldest that this program "
+            "reads; generate the dataset again, or read it with the muslin that made it"
+        )
     try:
         return Header(**values)
     except TypeError as error:
         raise InputError(f"{path}: {error}; {_RESTORE}") from error
 
 
-def prepare_root(root: Path, header: Header) -> Header | None:
-    """Make a folder ready to hold the samples of a header; return the header that was there before, if any.
+def prepare_root(root: Root, header: Header) -> Header | None:
+    """Make a place ready to hold the samples of a header; return the header that was there before, if any.
 
-    Raises InputError, touching nothing, if the folder holds anything but a dataset, or a dataset of which
-    some planned sample is not planned by the new header: only an extension may go on in the same folder.
+    Raises InputError, touching nothing, if the place holds anything but a dataset, or a dataset of which
+    some planned sample is not planned by the new header: only an extension may go on in the same place.
     """
-    if root.exists() and not root.is_dir():
-        raise InputError(f"{root}: is a file; give a folder for the dataset")
-    if root.is_dir() and not (root / HEADER).exists():
-        strangers = sorted(p.name for p in root.iterdir() if not _own(p.name))
+    before = read_header(root) if root.exists(HEADER) else None
+    if before is None:
+        strangers = [name for name in root.names() if name not in (CARD, SAMPLES)]
         if strangers:
             raise InputError(
                 f"{root}: not empty ({', '.join(strangers[:3])}…) and no muslin dataset; "
                 "give an empty or new folder"
             )
-    before = read_header(root) if (root / HEADER).exists() else None
     if before is not None:
         dropped = [sample for sample in before.splits if sample not in header.splits]
         if dropped:
@@ -113,8 +115,7 @@ def prepare_root(root: Path, header: Header) -> Header | None:
                 f"samples the new one has not; differs: {differs}; "
                 "write to another folder, or only extend the config"
             )
-    durable.make_folder(root / SAMPLES)
-    durable.make_folder(root / PARTIAL)
+    root.prepare()
     return before
 
 
@@ -134,12 +135,6 @@ def _leaves(value: Any, prefix: str = "") -> dict[str, Any]:
     else:
         return {prefix: value}
     return {key: leaf for name, entry in pairs for key, leaf in _leaves(entry, name).items()}
-
-
-def _own(name: str) -> bool:
-    return name in (CARD, LOCK, PARTIAL, SAMPLES) or (
-        name.startswith(f".{HEADER}.") and name.endswith(".tmp")
-    )
 
 
 _RESTORE = "restore it from a copy, or generate the dataset again in a new folder"

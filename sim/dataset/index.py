@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable, store
+from muslin.sim.dataset import store
 from muslin.sim.dataset.header import Header
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.schema import INDEX
 
 COLUMNS = pa.schema(
@@ -56,18 +56,24 @@ _FROM_CERTIFICATE = (
 )
 
 
-def row(root: Path, header: Header, sample_id: str) -> dict[str, Any]:
-    """The row of a sample, read from its group. Raises InputError if the group is damaged."""
+def read_row(root: Root, sample_id: str) -> dict[str, Any]:
+    """The row of a sample, read from its file. Raises InputError if that is damaged."""
     meta, checksums = store.read_meta(root, sample_id)
+    return row_of(meta, checksums, store.stored_bytes(root, sample_id))
+
+
+def row_of(meta: Mapping[str, Any], checksums: Mapping[str, str], size: int) -> dict[str, Any]:
+    """The row of a sample of which `meta` and checksums are known; its split is the header's to say."""
     labels, certificate = meta["labels"], meta["certificate"]
     values = {
-        "id": sample_id,
+        "id": meta["id"],
         "kind": meta["kind"],
-        "split": header.splits.get(sample_id, ""),
+        "split": "",
         "garment": meta["garment"]["name"],
         "design": labels.get("design", meta["garment"]["name"]),
         "shape": labels.get("shape", ""),
         "sequence": labels.get("sequence", ""),
+        "topology": labels.get("topology", ""),
         "fabric": meta["fabric"],
         "body": (meta["body"] or {}).get("model", ""),
         "frames": meta["frames"],
@@ -75,51 +81,58 @@ def row(root: Path, header: Header, sample_id: str) -> dict[str, Any]:
         "vertices": meta["vertices"],
         "topologies": meta.get("topologies", 1),
         "seed": meta["seed"],
-        "bytes": store.stored_bytes(root, sample_id),
+        "bytes": size,
         "geometry_sha256": store.geometry_digest(checksums),
     }
     return values | {key: certificate[key] for key in _FROM_CERTIFICATE}
 
 
-def write_index(root: Path, header: Header) -> None:
-    """Write the rows of all samples that are there, in plan order, replacing the index in one step."""
+def write_index(root: Root, header: Header, known: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+    """Write the rows of all samples that are there, in plan order, replacing the index in one step.
+
+    known   {id: row} of samples that need not be read
+    """
     ids = in_plan_order(header, store.stored_ids(root))
-    rows = [row(root, header, sample_id) for sample_id in ids]
+    have = known or {}
+    rows = [have[sample_id] if sample_id in have else read_row(root, sample_id) for sample_id in ids]
     remeshed = any(entry["topologies"] > 1 for entry in rows)
+    rows = [{**entry, "split": header.splits.get(entry["id"], "")} for entry in rows]
     table = pa.Table.from_pylist(rows, schema=COLUMNS.append(TOPOLOGIES) if remeshed else COLUMNS)
     sink = io.BytesIO()
     pq.write_table(table, sink)
-    durable.write_file(root / INDEX, sink.getvalue())
+    root.write(INDEX, sink.getvalue())
 
 
-def read_index(root: Path, header: Header) -> list[dict[str, Any]]:
+def read_index(root: Root, header: Header) -> list[dict[str, Any]]:
     """Rows of all samples, in plan order.
 
     Rows that the index lacks (a run was killed before it wrote them) are read from the samples; a row whose
     sample is gone is kept, so that the loss is seen. Raises InputError if the index or a sample is damaged.
     """
-    rows = {entry["id"]: entry for entry in _stored_rows(root)}
+    rows = stored_rows(root)
     ids = in_plan_order(header, {*rows, *store.stored_ids(root)})
-    found = [rows[sample_id] if sample_id in rows else row(root, header, sample_id) for sample_id in ids]
+    found = [rows[sample_id] if sample_id in rows else read_row(root, sample_id) for sample_id in ids]
     return [entry | {"split": header.splits.get(entry["id"], "")} for entry in found]
 
 
-def listed_ids(root: Path) -> list[str]:
-    """Ids in the index file; empty without one. Raises InputError if it is damaged."""
-    return [entry["id"] for entry in _stored_rows(root)]
+def stored_rows(root: Root, but: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+    """{id: row} of the index file, without those of `but`; empty without a file.
 
-
-def _stored_rows(root: Path) -> list[dict[str, Any]]:
-    path = root / INDEX
-    if not path.is_file():
-        return []
+    Raises InputError if it is damaged.
+    """
     try:
-        table = pq.read_table(path)
+        data = root.read(INDEX)
+    except FileNotFoundError:
+        return {}
+    path = root.place(INDEX)
+    try:
+        table = pq.read_table(io.BytesIO(data))
     except (pa.ArrowException, OSError) as error:
         raise InputError(f"{path}: not readable ({error}); {_REBUILD}") from error
     if table.schema.names not in (COLUMNS.names, COLUMNS.append(TOPOLOGIES).names):
         raise InputError(f"{path}: columns are not those of an index; {_REBUILD}")
-    return [{TOPOLOGIES.name: 1} | entry for entry in table.to_pylist()]
+    rows = ({TOPOLOGIES.name: 1} | entry for entry in table.to_pylist())
+    return {entry["id"]: entry for entry in rows if entry["id"] not in but}
 
 
 _REBUILD = "delete it, it is rebuilt from the samples"

@@ -10,6 +10,7 @@ from typing import Any
 
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.root import Root
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ _WORST = {
 }
 
 
-def info(path: str | Path) -> DatasetInfo:
+def info(path: str | Path | Root) -> DatasetInfo:
     """Summarise the dataset in a folder. Raises InputError as `open_dataset`."""
     dataset = open_dataset(path)
     rows = dataset.rows
@@ -71,7 +72,7 @@ def info(path: str | Path) -> DatasetInfo:
     kinds = Counter(row["kind"] for row in rows)
     sizes = [row["vertices"] for row in rows] or [0]
     return DatasetInfo(
-        name=str(dataset.header.config.get("name", dataset.root.name)),
+        name=str(dataset.header.config.get("name", str(dataset.root))),
         schema_version=dataset.header.schema_version,
         samples=len(rows),
         missing=len(dataset.missing),

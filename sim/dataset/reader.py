@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable, store
+from muslin.sim.dataset import store
 from muslin.sim.dataset.frames import read_frame
 from muslin.sim.dataset.header import Header, prepare_root, read_header
 from muslin.sim.dataset.index import read_index, write_index
+from muslin.sim.dataset.root import Root, open_root
 from muslin.sim.dataset.sample import Sample
-from muslin.sim.dataset.schema import LOCK
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Dataset:
     rows   one dict a sample, the columns of `index.COLUMNS` and `topologies`, in plan order
     """
 
-    root: Path
+    root: Root
     header: Header
     rows: tuple[dict[str, Any], ...]
 
@@ -91,34 +91,40 @@ class Dataset:
         return replace(self, rows=rows)
 
 
-def open_dataset(path: str | Path) -> Dataset:
-    """Open the dataset in a folder. Raises InputError if it is none, or is damaged or of a newer schema."""
-    root = Path(path)
+def open_dataset(path: str | Path | Root) -> Dataset:
+    """Open the dataset in a folder, or at a URL that fsspec knows.
+
+    Raises InputError if it is none, or is damaged or of another schema.
+    """
+    root = open_root(path)
     header = read_header(root)
     return Dataset(root, header, tuple(read_index(root, header)))
 
 
 def write_dataset(
-    path: str | Path, samples: Iterable[Sample], config: dict[str, Any] | None = None, solver_digest: str = ""
+    path: str | Path | Root,
+    samples: Iterable[Sample],
+    config: dict[str, Any] | None = None,
+    solver_digest: str = "",
 ) -> Dataset:
     """Write samples that were made elsewhere (one scene, predictions) as a dataset of their own.
 
     A sample's `labels["split"]`, if any, is its split. Raises InputError if the folder holds anything else,
     or a sample of the same id.
     """
-    root = Path(path)
+    root = open_root(path)
     made = list(samples)
     splits = {sample.id: sample.labels.get("split", "") for sample in made}
     if len(splits) < len(made):
         raise InputError(f"{root}: two of the samples have the same id; give every sample an id of its own")
     header = Header(config=config or {}, splits=splits, solver_digest=solver_digest)
     prepare_root(root, header)
-    with durable.exclusive(root / LOCK):
+    with root.lock():
         for sample in made:
-            if store.sample_path(root, sample.id).exists():
+            if root.exists(store.sample_name(sample.id)):
                 raise InputError(f"{root}: holds a sample {sample.id!r} already; write to another folder")
         header.write(root)
-        store.clean_partial(root)
+        root.clean()
         for sample in made:
             store.write_sample(root, sample)
         write_index(root, header)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from muslin.garments.errors import InputError
 from muslin.sim.body.load import load_body
-from muslin.sim.dataset import durable, store
+from muslin.sim.dataset import store
 from muslin.sim.dataset.config import parse_config
-from muslin.sim.dataset.generate import Progress, generate
+from muslin.sim.dataset.engine import Cluster
+from muslin.sim.dataset.generate import generate
 from muslin.sim.dataset.header import read_header
-from muslin.sim.dataset.index import listed_ids, write_index
-from muslin.sim.dataset.schema import HEADER, LOCK
+from muslin.sim.dataset.index import stored_rows, write_index
+from muslin.sim.dataset.progress import Progress
+from muslin.sim.dataset.root import Root, open_root
+from muslin.sim.dataset.schema import HEADER
 from muslin.sim.dataset.verify import verify
 from muslin.sim.dataset.worker import ChainSimulator
 
@@ -38,7 +41,7 @@ class RepairReport:
     missing: tuple[str, ...] = ()
     index: str = ""
     made: tuple[str, ...] = ()
-    aside: dict[str, Path] = field(default_factory=dict)
+    aside: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
     dry: bool = False
 
@@ -50,9 +53,11 @@ class RepairReport:
 
 
 def repair(
-    path: str | Path,
+    path: str | Path | Root,
     *,
+    ids: Collection[str] | None = None,
     workers: int | None = None,
+    cluster: Cluster | None = None,
     device: str = "cpu",
     dry: bool = False,
     progress: Progress | None = None,
@@ -61,11 +66,13 @@ def repair(
 ) -> RepairReport:
     """Verify every sample; make again what fails, and what is missing, from the config in the header.
 
-    What is there of a sample that fails is moved to `failed/ID.zarr-N`: nothing is deleted. Samples that are
-    well are not touched, and those made again are, on the machine that made them, the same to the bit. They
-    are verified in turn; one that fails again (it is wrong by its making, not damaged) is in `failed` of the
-    report. An index that cannot be read is written anew.
+    What is there of a sample that fails is moved to `failed/ID.zarr.zip-N`: nothing is deleted. Samples
+    that are well are not touched, and those made again are, on the machine that made them, the same to
+    the bit. They are verified in turn; one that fails again (it is wrong by its making, not damaged) is
+    in `failed` of the report. An index that cannot be read is written anew.
 
+    ids                    look at these only; unless given, all; samples in quarantine are tried again
+    workers, cluster       as for `generate`
     dry                    only tell; nothing is written
     simulate, make_scene   as for `generate`
 
@@ -73,26 +80,32 @@ def repair(
     config does not plan what is to be made again, if another solver made the dataset, or if a body is not
     the one that it was made with.
     """
-    root = Path(path)
+    root = open_root(path)
     header = read_header(root)
     index_error, listed = _index(root)
-    ids = {*listed, *store.stored_ids(root)}
-    found = verify(root, ids=ids, workers=workers, progress=progress)
-    missing = tuple(sample_id for sample_id in header.splits if sample_id not in ids)
+    there = {*listed, *store.stored_ids(root)}
+    if ids is not None:
+        _check_ids(root, ids, there | header.splits.keys())
+    chosen = [sample_id for sample_id in there if ids is None or sample_id in ids]
+    found = verify(root, ids=chosen, workers=workers, progress=progress)
+    missing = tuple(i for i in header.splits if i not in there and (ids is None or i in ids))
     report = RepairReport(found.samples, found.failed, missing, index_error, dry=dry)
     if dry:
         return report
     if not found.failed and not missing:
         if index_error:
-            with durable.exclusive(root / LOCK):
+            with root.lock():
                 write_index(root, header)
         return report
-    _check_bodies(root, ids)
-    config = parse_config(header.config, f"{root / HEADER}: not a dataset that can be made again: its config")
+    _check_bodies(root, there)
+    config = parse_config(
+        header.config, f"{root.place(HEADER)}: not a dataset that can be made again: its config"
+    )
     result = generate(
         config,
         root,
         workers=workers,
+        cluster=cluster,
         device=device,
         progress=progress,
         simulate=simulate,
@@ -103,7 +116,7 @@ def repair(
     return replace(report, made=result.made, aside=result.aside, failed=result.failed | checked.failed)
 
 
-def _check_bodies(root: Path, ids: Iterable[str]) -> None:
+def _check_bodies(root: Root, ids: Iterable[str]) -> None:
     """Raise InputError if a body is not, or is not any more, the one that the samples were made with.
 
     Such samples fail verification too, but they are not what is damaged: made again, they would be others.
@@ -125,9 +138,17 @@ def _check_bodies(root: Path, ids: Iterable[str]) -> None:
             )
 
 
-def _index(root: Path) -> tuple[str, list[str]]:
+def _check_ids(root: Root, ids: Collection[str], known: Collection[str]) -> None:
+    unknown = sorted(set(ids) - set(known))
+    if unknown:
+        raise InputError(
+            f"{root}: has and plans no sample {unknown[0]!r}; see `muslin info {root} --samples`"
+        )
+
+
+def _index(root: Root) -> tuple[str, list[str]]:
     """Why the index cannot be read, or no reason; the ids that it lists."""
     try:
-        return "", listed_ids(root)
+        return "", list(stored_rows(root))
     except InputError as error:
         return str(error), []

@@ -3,10 +3,14 @@
     ROOT/muslin.json               header: schema version, config, versions, solver digest, splits
     ROOT/index.parquet             one row a sample; a cache of what the samples say, rebuilt when missing
     ROOT/README.md                 card: what the dataset is, for people; written by `generate`
-    ROOT/samples/ID.zarr/          one zarr 3 group a sample
+    ROOT/progress.json             how far the last run was, for who looks from elsewhere
+    ROOT/samples/ID.zarr.zip       one zarr 3 group a sample, in an archive without compression
+    ROOT/failed/ID.json            why a sample was given up, and all that is needed to look into it
     ROOT/failed/ID.npz             last good state of a sample whose simulation could not go on
-    ROOT/failed/ID.zarr-N/         a sample that was found damaged, set aside by `muslin repair`
-    ROOT/.partial/, ROOT/.lock     samples being written, and the lock of the process that writes
+    ROOT/failed/ID.zarr.zip-N      a sample that was found damaged, set aside by `muslin repair`
+    ROOT/.partial/, ROOT/.lock     files being written, and the lock of the process that writes
+
+ROOT is a folder, or a place in an object store (no `.partial` there: objects appear whole).
 
 Attributes of a group: `meta` (what is not an array, certificate included), `sha256` of every array's bytes (C
 order, little endian) and `meta_sha256` of the canonical JSON of `meta`. Arrays are compressed without loss.
@@ -18,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SCHEMA_VERSION = 1
-"""Of the folder and its header."""
+SCHEMA_VERSION = 2
+"""Of the folder and its header; 1 had a folder a sample."""
 SAMPLE_VERSION = 1
 """Of a sample of fixed topology: its form did not change when remeshed sequences came."""
 REMESHED_SAMPLE_VERSION = 2
@@ -29,11 +33,12 @@ FORMAT = "muslin dataset"
 HEADER = "muslin.json"
 INDEX = "index.parquet"
 CARD = "README.md"
+PROGRESS = "progress.json"
 SAMPLES = "samples"
 PARTIAL = ".partial"
 FAILED = "failed"
 LOCK = ".lock"
-SUFFIX = ".zarr"
+SUFFIX = ".zarr.zip"
 
 CHUNK_BYTES = 1 << 18
 """Frames (or their rows) are gathered in chunks of about this size, so that one frame can be read without the

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +12,16 @@ import numpy as np
 import zarr
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.cloth_arrays import cloth_arrays, cloth_of
 from muslin.sim.dataset.codecs import create_array, numcodecs_unremarked
 from muslin.sim.dataset.header import digest
+from muslin.sim.dataset.packed import PackedStore, pack
 from muslin.sim.dataset.remeshed import RemeshedSequence
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.dataset.schema import (
     ARRAYS,
-    PARTIAL,
     REMESHED_ARRAYS,
     REMESHED_SAMPLE_VERSION,
     SAMPLE_VERSION,
@@ -31,31 +30,38 @@ from muslin.sim.dataset.schema import (
     ArraySpec,
 )
 
+UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError)
+"""What zarr and its codecs raise over damaged files."""
 REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
 
 
-def sample_path(root: Path, sample_id: str) -> Path:
-    return root / SAMPLES / f"{sample_id}{SUFFIX}"
+def sample_name(sample_id: str) -> str:
+    """Name of a sample's file under the root."""
+    return f"{SAMPLES}/{sample_id}{SUFFIX}"
 
 
-def stored_ids(root: Path) -> list[str]:
+def sample_file(folder: Path, sample_id: str) -> Path:
+    """A sample's file in the local folder of a dataset."""
+    return folder / sample_name(sample_id)
+
+
+def stored_ids(root: Root) -> list[str]:
     """Ids of the samples that are there, sorted."""
-    folder = root / SAMPLES
-    if not folder.is_dir():
-        return []
-    return sorted(p.name.removesuffix(SUFFIX) for p in folder.iterdir() if p.name.endswith(SUFFIX))
+    return [name.removesuffix(SUFFIX) for name in root.names(SAMPLES) if name.endswith(SUFFIX)]
 
 
-def clean_partial(root: Path) -> None:
-    """Remove what a killed writer left half-written."""
-    for entry in (root / PARTIAL).iterdir():
-        shutil.rmtree(entry)
-    for file in root.glob(".*.tmp"):
-        file.unlink()
+@dataclass(frozen=True)
+class Stored:
+    """What was committed. new: False if a sample of that id was there already; that one was kept."""
+
+    new: bool
+    meta: dict[str, Any]
+    checksums: dict[str, str]
+    size: int
 
 
-def write_sample(root: Path, sample: Sample) -> bool:
-    """Commit a sample under its id. False if a sample of that id was there already; that one is kept.
+def write_sample(root: Root, sample: Sample) -> Stored:
+    """Commit a sample under its id.
 
     Raises InputError if the sample's arrays cannot be (see `Sample.validate`).
     """
@@ -66,62 +72,84 @@ def write_sample(root: Path, sample: Sample) -> bool:
     arrays = _arrays(sample, specs)
     meta = _meta(sample)
     checksums = {name: _sha256(array) for name, array in arrays.items()}
-    partial = root / PARTIAL / f"{sample.id}-{os.getpid()}{SUFFIX}"
+    memory = zarr.storage.MemoryStore()
     group = zarr.create_group(
-        zarr.storage.LocalStore(partial),
+        memory,
         attributes={"meta": meta, "meta_sha256": digest(meta), "sha256": checksums},
     )
     for name, array in arrays.items():
         create_array(group, name, array, specs[name])
-    return durable.commit_directory(partial, sample_path(root, sample.id))
+    data = pack(memory)
+    return Stored(root.create(sample_name(sample.id), data), meta, checksums, len(data))
 
 
-def read_meta(root: Path, sample_id: str) -> tuple[dict[str, Any], dict[str, str]]:
+def read_meta(root: Root, sample_id: str) -> tuple[dict[str, Any], dict[str, str]]:
     """What a sample says of itself apart from arrays, and the sha256 of each array.
 
     Raises InputError if the sample is missing, damaged or of a newer schema.
     """
-    path = sample_path(root, sample_id)
-    if not path.is_dir():
-        raise InputError(f"{path}: the sample is missing; run `muslin generate` again to make it")
-    attributes = dict(_open(path).attrs)
+    return meta_of(open_sample(root, sample_id), sample_place(root, sample_id))
+
+
+def sample_place(root: Root, sample_id: str) -> str:
+    """A sample's file as messages name it."""
+    return root.place(sample_name(sample_id))
+
+
+def open_sample(root: Root, sample_id: str) -> zarr.Group:
+    """The zarr group of a sample, to be read. Raises InputError if it is missing or no such group."""
+    place = sample_place(root, sample_id)
+    try:
+        store = PackedStore(root, sample_name(sample_id))
+    except FileNotFoundError as error:
+        raise InputError(f"{place}: the sample is missing; run `muslin generate` again to make it") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"{place}: not readable ({error}); {REMEDY}") from error
+    try:
+        return zarr.open_group(store, mode="r", zarr_format=3)
+    except UNREADABLE as error:
+        raise InputError(f"{place}/zarr.json: not readable ({error}); {REMEDY}") from error
+
+
+def meta_of(group: zarr.Group, place: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """`read_meta` of a sample that is open."""
+    attributes = dict(group.attrs)
     meta, checksums = attributes.get("meta"), attributes.get("sha256")
     if not isinstance(meta, dict) or not isinstance(checksums, dict):
-        raise InputError(f"{path}/zarr.json: not the attributes of a sample; {REMEDY}")
+        raise InputError(f"{place}/zarr.json: not the attributes of a sample; {REMEDY}")
     if meta.get("schema_version", 0) > REMESHED_SAMPLE_VERSION:
         raise InputError(
-            f"{path}: schema_version = {meta['schema_version']} is newer than {REMESHED_SAMPLE_VERSION}, the "
-            "newest that  this program reads; update muslin (pip install -U muslin)"
+            f"{place}: schema_version = {meta['schema_version']} is newer than {REMESHED_SAMPLE_VERSION}, "
+            "the newest that this program reads; update muslin (pip install -U muslin)"
         )
     if attributes.get("meta_sha256") != digest(meta):
-        raise InputError(f"{path}/zarr.json: attributes do not match their checksum; {REMEDY}")
+        raise InputError(f"{place}/zarr.json: attributes do not match their checksum; {REMEDY}")
     return meta, checksums
 
 
-def read_sample(root: Path, sample_id: str) -> Sample:
+def read_sample(root: Root, sample_id: str) -> Sample:
     """A sample with all its arrays, each checked against its sha256. Raises InputError as `read_meta`."""
-    meta, checksums = read_meta(root, sample_id)
-    path = sample_path(root, sample_id)
-    group = _open(path)
-    arrays = {name: _read_array(group, path, name, checksum) for name, checksum in checksums.items()}
+    group, place = open_sample(root, sample_id), sample_place(root, sample_id)
+    meta, checksums = meta_of(group, place)
+    arrays = {name: _read_array(group, place, name, checksum) for name, checksum in checksums.items()}
     try:
         sample = _assemble(meta, arrays)
     except (KeyError, TypeError) as error:
-        raise InputError(f"{path}: the sample lacks {error}; {REMEDY}") from error
+        raise InputError(f"{place}: the sample lacks {error}; {REMEDY}") from error
     except InputError as error:
-        raise InputError(f"{path}: {error}; {REMEDY}") from error
+        raise InputError(f"{place}: {error}; {REMEDY}") from error
     if sample.id != sample_id:
-        raise InputError(f"{path}: holds sample {sample.id!r}; rename the folder to {sample.id}{SUFFIX}")
+        raise InputError(f"{place}: holds sample {sample.id!r}; rename the file to {sample.id}{SUFFIX}")
     return sample.validate()
 
 
-def read_array(root: Path, sample_id: str, name: str) -> np.ndarray:
+def read_array(root: Root, sample_id: str, name: str) -> np.ndarray:
     """One checked array of a sample (names in `schema.ARRAYS`), without reading the others."""
-    _, checksums = read_meta(root, sample_id)
-    path = sample_path(root, sample_id)
+    group, place = open_sample(root, sample_id), sample_place(root, sample_id)
+    _, checksums = meta_of(group, place)
     if name not in checksums:
-        raise InputError(f"{path}: has no array {name!r}; it has {', '.join(sorted(checksums))}")
-    return _read_array(_open(path), path, name, checksums[name])
+        raise InputError(f"{place}: has no array {name!r}; it has {', '.join(sorted(checksums))}")
+    return _read_array(group, place, name, checksums[name])
 
 
 def geometry_digest(checksums: Mapping[str, str]) -> str:
@@ -129,9 +157,9 @@ def geometry_digest(checksums: Mapping[str, str]) -> str:
     return digest(dict(checksums))
 
 
-def stored_bytes(root: Path, sample_id: str) -> int:
-    """Size of a sample on disk, bytes."""
-    return sum(p.stat().st_size for p in sample_path(root, sample_id).rglob("*") if p.is_file())
+def stored_bytes(root: Root, sample_id: str) -> int:
+    """Size of a sample's file."""
+    return root.size(sample_name(sample_id))
 
 
 def _arrays(sample: Sample, specs: Mapping[str, ArraySpec]) -> dict[str, np.ndarray]:
@@ -203,22 +231,15 @@ def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
     )
 
 
-def _read_array(group: zarr.Group, path: Path, name: str, checksum: str) -> np.ndarray:
+def _read_array(group: zarr.Group, place: str, name: str, checksum: str) -> np.ndarray:
     try:
         with numcodecs_unremarked():
             array = np.asarray(group[name][...])  # type: ignore[index]
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}/{name}: not readable ({error}); {REMEDY}") from error
+    except UNREADABLE as error:
+        raise InputError(f"{place}/{name}: not readable ({error}); {REMEDY}") from error
     if _sha256(array) != checksum:
-        raise InputError(f"{path}/{name}: bytes do not match their sha256; {REMEDY}")
+        raise InputError(f"{place}/{name}: bytes do not match their sha256; {REMEDY}")
     return array
-
-
-def _open(path: Path) -> zarr.Group:
-    try:
-        return zarr.open_group(zarr.storage.LocalStore(path, read_only=True), mode="r", zarr_format=3)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}/zarr.json: not readable ({error}); {REMEDY}") from error
 
 
 def _sha256(array: np.ndarray) -> str:

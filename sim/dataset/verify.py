@@ -16,13 +16,14 @@ from muslin.garments.errors import InputError
 from muslin.sim.body.interior import MASK_GAP_M, masked_face_is_interior
 from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.header import read_header
-from muslin.sim.dataset.index import in_plan_order, listed_ids
+from muslin.sim.dataset.index import in_plan_order, stored_rows
 from muslin.sim.dataset.intersections import count_intersections
 from muslin.sim.dataset.processes import (
     in_processes,
     leave_interrupts_to_parent,
     usable_cores,
 )
+from muslin.sim.dataset.root import Root, open_root
 from muslin.sim.dataset.sample import Sample
 
 FRAMES_A_TASK = 24
@@ -66,7 +67,7 @@ class Verification:
 
 @dataclass(frozen=True)
 class _Task:
-    root: Path
+    root: Root
     sample_id: str
     start: int
     stop: int | None
@@ -85,7 +86,7 @@ class Finding:
 
 
 def verify(
-    path: str | Path,
+    path: str | Path | Root,
     *,
     ids: Collection[str] | None = None,
     workers: int | None = None,
@@ -101,11 +102,11 @@ def verify(
 
     ids   check only these; unless given, all that are stored and all that the index lists
     """
-    root = Path(path)
+    root = open_root(path)
     header = read_header(root)
     _sample.cache_clear()  # the dataset may have changed since this process verified it last
     stored = store.stored_ids(root)
-    wanted = in_plan_order(header, {*listed_ids(root), *stored} if ids is None else ids)
+    wanted = in_plan_order(header, {*stored_rows(root), *stored} if ids is None else ids)
     # Damaged attributes fail their sample, so they must not fail the listing.
     tasks = [task for sample_id in wanted for task in _tasks(root, sample_id)]
     count = min(workers or usable_cores(), max(1, len(tasks)))
@@ -117,7 +118,7 @@ def verify(
     return _summary(len(wanted), len(header.splits.keys() - {*wanted, *stored}), findings)
 
 
-def _tasks(root: Path, sample_id: str) -> list[_Task]:
+def _tasks(root: Root, sample_id: str) -> list[_Task]:
     """Blocks of frames; the last goes to the end of the sample, whatever its attributes say of its length."""
     try:
         frames = int(store.read_meta(root, sample_id)[0]["frames"])
@@ -184,7 +185,7 @@ def _run(task: _Task) -> Finding:
 
 
 @lru_cache(maxsize=2)
-def _sample(root: Path, sample_id: str) -> Sample:
+def _sample(root: Root, sample_id: str) -> Sample:
     sample = store.read_sample(root, sample_id)
     for garment in sample.garments:
         garment.validate()

@@ -1,25 +1,23 @@
-"""What one process of `generate` does: make the missing samples of a chain and commit them one by one."""
+"""What a worker of `generate` does: make the missing samples of a chain and commit them one by one."""
 
 from __future__ import annotations
 
-import os
-import threading
+import io
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
-from multiprocessing.connection import wait as wait_for
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import durable, store
+from muslin.sim.dataset import store
 from muslin.sim.dataset.header import digest
+from muslin.sim.dataset.index import read_row, row_of
 from muslin.sim.dataset.jobs import Chain, Job
-from muslin.sim.dataset.processes import leave_interrupts_to_parent
+from muslin.sim.dataset.quarantine import state_name
+from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.sample import Sample
-from muslin.sim.dataset.schema import FAILED
 from muslin.sim.solve.errors import LastState, SimulationError
 
 FrameProgress = Callable[[int, int], None]
@@ -32,77 +30,117 @@ process."""
 
 @dataclass(frozen=True)
 class Task:
-    """What one process needs to make the missing samples of a chain."""
+    """What a worker needs to make the missing samples of a chain."""
 
-    place: int
-    root: Path
+    root: Root
     chain: Chain
-    scenes: list[Any]
     missing: frozenset[str]
     versions: dict[str, str]
+    solver: str
     device: str
     simulate: ChainSimulator | None
+    make_scene: Callable[[dict[str, Any]], Any] | None
+
+    @property
+    def wanted(self) -> list[Job]:
+        """The jobs whose samples are missing."""
+        return [job for job in self.chain.jobs if job.id in self.missing]
 
 
-_news: Any = None
+@dataclass(frozen=True)
+class Made:
+    """What came of a chain.
+
+    rows     index rows of the samples that were made
+    failed   id of the sample at which the chain ended, with the reason and what a developer needs; or empty
+    seconds  that the worker was at it
+    """
+
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    failed: str = ""
+    reason: str = ""
+    log: tuple[str, ...] = ()
+    seconds: float = 0.0
 
 
-def start_worker(news: Any, leash: Connection) -> None:
-    global _news
-    _news = news
-    leave_interrupts_to_parent()
-    # What the queue still holds must not keep a worker from ending when nobody reads it any more.
-    news.cancel_join_thread()
-    threading.Thread(target=_end_with_parent, args=(leash,), daemon=True).start()
+def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
+    """Make the missing samples of a chain; tell [share of its work that is done, id of what it is at]."""
+    begun = time.perf_counter()
+    left = task.wanted
+    rows: list[dict[str, Any]] = []
 
+    def told(done: int, total: int) -> None:
+        tell([done / max(1, total), left[0].id])
 
-def _end_with_parent(leash: Connection) -> None:
-    """End this process as soon as the other end of the leash is closed: by the parent, or by its death."""
-    wait_for([leash])
-    os._exit(1)
-
-
-def make_chain(task: Task) -> dict[str, str]:
-    """Make the missing samples of a chain; return {id: reason} of those that could not be made."""
-    simulate = task.simulate
-    if simulate is None:
-        from muslin.sim.run import simulate_chain
-
-        simulate = simulate_chain
-
-    def tell(done: int, total: int) -> None:
-        _news.put((task.place, done / max(1, total), task.chain.jobs[0].id))
-
-    left = [job for job in task.chain.jobs if job.id in task.missing]
-    started = time.perf_counter()
     try:
-        samples = simulate(task.scenes, task.device, tell)
+        simulate, scenes = _prepared(task)
+        samples = simulate(scenes, task.device, told)
+        started = time.perf_counter()
         for job, sample in zip(task.chain.jobs, samples, strict=True):
             seconds = time.perf_counter() - started
             if job.id in task.missing:
-                store.write_sample(task.root, _named(job, sample, task, seconds))
-                (task.root / FAILED / f"{job.id}.npz").unlink(missing_ok=True)
+                rows.append(_commit(task.root, _named(job, sample, task, seconds)))
                 left.remove(job)
             if not left:
                 break
             started = time.perf_counter()
     except Exception as error:  # reported for the samples it cost; the other chains are not its business
         reason = f"{type(error).__name__}: {error}"
-        if isinstance(error, SimulationError) and error.state is not None and left:
+        if isinstance(error, SimulationError) and error.state is not None:
             reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
-        if not isinstance(error, InputError | SimulationError):
-            reason += "\n" + traceback.format_exc()
-        return {job.id: reason for job in left}
-    _news.put((task.place, 1.0, task.chain.jobs[0].id))
-    return {}
+        log = tuple(traceback.format_exc().splitlines())
+        return Made(rows, left[0].id, reason, log, time.perf_counter() - begun)
+    return Made(rows, seconds=time.perf_counter() - begun)
 
 
-def _keep(root: Path, sample_id: str, state: LastState) -> Path:
-    """Save the state in which a sample was given up; return the file."""
-    path = root / FAILED / f"{sample_id}.npz"
-    durable.make_folder(path.parent)
-    state.save(path)
-    return path
+def _prepared(task: Task) -> tuple[ChainSimulator, list[Any]]:
+    if _solver(task.simulate) != task.solver:
+        raise InputError(
+            "this worker has another solver than the process that sent the work; give all machines the same "
+            "muslin and the same versions of what it needs (python, numpy, scipy, warp-lang, ipctk, zarr)"
+        )
+    if task.simulate is not None:
+        simulate = task.simulate
+    else:
+        from muslin.sim.run import simulate_chain as simulate
+
+        _compile(task.device)
+    if task.make_scene is not None:
+        make_scene = task.make_scene
+    else:
+        from muslin.sim.scene import parse_scene as make_scene
+    return simulate, [make_scene(job.scene) for job in task.chain.jobs]
+
+
+@lru_cache
+def _solver(simulate: ChainSimulator | None) -> str:
+    from muslin.sim.dataset.solver import solver_digest
+
+    return solver_digest(simulate)
+
+
+@lru_cache
+def _compile(device: str) -> None:
+    """Compile the kernels, once a machine: workers that start together would all compile the same."""
+    from muslin.sim.compile import compile_once
+
+    compile_once(device)
+
+
+def _commit(root: Root, sample: Sample) -> dict[str, Any]:
+    stored = store.write_sample(root, sample)
+    root.remove(state_name(sample.id))
+    if not stored.new:  # by another generator, to the same geometry
+        return read_row(root, sample.id)
+    return row_of(stored.meta, stored.checksums, stored.size)
+
+
+def _keep(root: Root, sample_id: str, state: LastState) -> str:
+    """Save the state in which a sample was given up; return its place."""
+    stream = io.BytesIO()
+    state.save(stream)
+    root.write(state_name(sample_id), stream.getvalue())
+    return root.place(state_name(sample_id))
 
 
 def _named(job: Job, sample: Sample, task: Task, seconds: float) -> Sample:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,9 @@ class LastState:
     collider_vertices: NDArray[np.float64]
     collider_faces: NDArray[np.int32]
 
-    def save(self, path: Path) -> None:
+    def save(self, stream: BinaryIO) -> None:
         """Write the arrays as one .npz file, under the names that they have here."""
-        with path.open("wb") as stream:
-            np.savez_compressed(stream, **vars(self))
+        np.savez_compressed(stream, **vars(self))
 
 
 class SimulationError(Exception):

@@ -1,0 +1,147 @@
+"""A zarr group as one file: a zip archive without compression, of which single chunks are read.
+
+One file a sample keeps datasets within the numbers of files that shared file systems allow, makes a commit
+one step, and one request of a store. zarr reads it as it is (`zarr.open_group("ID.zarr.zip")`). Here it is
+read through a `Root`, a chunk by one access at its place, of a folder and of a store alike.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import AsyncIterator, Iterable
+
+from zarr.abc.store import ByteRequest, OffsetByteRequest, RangeByteRequest, Store, SuffixByteRequest
+from zarr.core.buffer import Buffer, BufferPrototype
+from zarr.storage import MemoryStore
+
+from muslin.sim.dataset.root import Root
+
+_LOCAL_HEADER_BYTES = 30
+"""Before the name of an entry (PKWARE, APPNOTE.TXT, 4.3.7)."""
+_TAIL_BYTES = 1 << 15
+"""Read first: it holds the list of entries, unless they are many hundreds."""
+
+
+def pack(store: MemoryStore) -> bytes:
+    """The archive of what is in memory: the same bytes for the same content, at whatever time."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        # Metadata last, so that opening a sample takes one access.
+        for name in sorted(store._store_dict, key=lambda name: (name.endswith("zarr.json"), name)):
+            archive.writestr(zipfile.ZipInfo(name), store._store_dict[name].to_bytes())
+    return stream.getvalue()
+
+
+class PackedStore(Store):
+    """Read-only zarr store of an archive. ValueError: it is no such archive; FileNotFoundError: not there."""
+
+    supports_writes = False
+    supports_deletes = False
+    supports_listing = True
+    supports_partial_writes = False
+
+    def __init__(self, root: Root, name: str) -> None:
+        super().__init__(read_only=True)
+        self._root, self._name = root, name
+        self._file = _File(root, name)
+        try:
+            with zipfile.ZipFile(self._file) as archive:  # type: ignore[call-overload]
+                self._entries = {
+                    entry.filename: (entry.header_offset, entry.file_size)
+                    for entry in archive.infolist()
+                    if entry.compress_type == zipfile.ZIP_STORED
+                }
+        except zipfile.BadZipFile as error:
+            raise ValueError(str(error)) from error
+
+    def read(self, key: str, request: ByteRequest | None = None) -> bytes | None:
+        """Bytes of an entry, or the part asked for; None without such an entry."""
+        found = self._entries.get(key)
+        if found is None:
+            return None
+        offset, size = found
+        start, stop = 0, size
+        if isinstance(request, RangeByteRequest):
+            start, stop = request.start, min(request.end, size)
+        elif isinstance(request, OffsetByteRequest):
+            start = min(request.offset, size)
+        elif isinstance(request, SuffixByteRequest):
+            start = max(0, size - request.suffix)
+        begin = offset + _LOCAL_HEADER_BYTES + len(key.encode())  # `pack` writes no extra fields
+        return self._file.part(begin + start, begin + stop)
+
+    async def get(
+        self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
+    ) -> Buffer | None:
+        data = self.read(key, byte_range)
+        return None if data is None else prototype.buffer.from_bytes(data)
+
+    async def get_partial_values(
+        self, prototype: BufferPrototype, key_ranges: Iterable[tuple[str, ByteRequest | None]]
+    ) -> list[Buffer | None]:
+        return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]
+
+    async def exists(self, key: str) -> bool:
+        return key in self._entries
+
+    async def list(self) -> AsyncIterator[str]:
+        for key in self._entries:
+            yield key
+
+    async def list_prefix(self, prefix: str) -> AsyncIterator[str]:
+        for key in self._entries:
+            if key.startswith(prefix):
+                yield key
+
+    async def list_dir(self, prefix: str) -> AsyncIterator[str]:
+        inside = prefix.rstrip("/") + "/" if prefix else ""
+        found = {key[len(inside) :].split("/", 1)[0] for key in self._entries if key.startswith(inside)}
+        for name in sorted(found):
+            yield name
+
+    async def set(self, key: str, value: Buffer) -> None:
+        raise NotImplementedError("a packed sample is written whole")
+
+    async def delete(self, key: str) -> None:
+        raise NotImplementedError("a packed sample is written whole")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PackedStore) and (other._root, other._name) == (self._root, self._name)
+
+
+class _File(io.RawIOBase):
+    """A file of a root, of which the end is read at once and the rest where it is asked for."""
+
+    def __init__(self, root: Root, name: str) -> None:
+        self._root, self._file_name = root, name
+        self._size = root.size(name)
+        self._tail_start = max(0, self._size - _TAIL_BYTES)
+        self._tail = root.read(name, self._tail_start, self._size)
+        self._place = 0
+
+    def part(self, start: int, stop: int) -> bytes:
+        if start >= self._tail_start:
+            return self._tail[start - self._tail_start : stop - self._tail_start]
+        return self._root.read(self._file_name, start, stop)
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._place
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._place = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
+        if self._place < 0:
+            raise OSError(f"place {self._place} is before the start of the file")
+        return self._place
+
+    def read(self, count: int | None = -1) -> bytes:
+        stop = self._size if count is None or count < 0 else min(self._size, self._place + count)
+        data = self.part(self._place, stop)
+        self._place = stop
+        return data
