@@ -15,22 +15,21 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.load import load_body
 from muslin.sim.body.model import BodyModel
 from muslin.sim.budget import with_budget
-from muslin.sim.certify import certify_rounded, solved
-from muslin.sim.dataset.certificate import Certificate
-from muslin.sim.dataset.remeshed import sample_of_frames
-from muslin.sim.dataset.sample import BodyTrack, Sample
+from muslin.sim.dataset.sample import Sample
 from muslin.sim.device import open_device
 from muslin.sim.failure import stopped
 from muslin.sim.motion.arms import spread_arms
-from muslin.sim.motion.clips import load_motion
 from muslin.sim.motion.grounding import fit_to_body
-from muslin.sim.motion.lead_in import lead_in
 from muslin.sim.motion.motion import Motion
-from muslin.sim.relax import RestReport, settle
+from muslin.sim.motion_table import read_motion
+from muslin.sim.recording import Recording
+from muslin.sim.relax import settle
 from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.scene import Scene
+from muslin.sim.sequences import sequence
 from muslin.sim.setting import cut_garment, garments_of, settings_of
 from muslin.sim.solve.errors import SimulationError
+from muslin.sim.topologies import Topologies, same_simulation, simulated
 from muslin.sim.wear import WornGarment, a_pose
 from muslin.sim.world.play import play
 
@@ -39,7 +38,6 @@ __all__ = ["SimulationError", "compile_kernels", "cut_garment", "simulate", "sim
 Progress = Callable[[int, int], None]
 
 DRESS_WORK, MORPH_WORK = 30, 20
-LEAD_IN_SECONDS = 1.0
 
 
 def simulate(scene: Scene, device: str = "cpu", progress: Progress | None = None) -> Sample:
@@ -52,8 +50,25 @@ def simulate_chain(
 ) -> Iterator[Sample]:
     """Samples of scenes that share garment, fabric and body model, each draped from where the last one ended.
 
-    The garment is put on once; between drapes the body changes shape inside it.
+    The garment is put on once; between drapes the body changes shape inside it. Scenes that follow one
+    another and differ in nothing but the topology fitted to them come from one simulation.
     """
+    together: list[list[Scene]] = []
+    for scene in scenes:
+        fitted = simulated(scene) is not scene
+        if fitted and together and same_simulation(together[-1][0], scene):
+            together[-1].append(scene)
+        else:
+            together.append([scene])
+    topologies = Topologies()
+    sources = _simulated_chain([simulated(group[0]) for group in together], device, progress)
+    for group, source in zip(together, sources, strict=True):
+        for scene in group:
+            yield source if simulated(scene) is scene else topologies.fitted(scene, source)
+
+
+def _simulated_chain(scenes: Sequence[Scene], device: str, progress: Progress | None) -> Iterator[Sample]:
+    """Samples of scenes without topologies that are fitted."""
     if not scenes:
         return
     open_device(device)
@@ -92,7 +107,8 @@ def simulate_chain(
         if clip is None:
             yield _drape(scene, mesh, worn, work, started)
         else:
-            yield _sequence(scene, mesh, worn, clip, work, started)
+            work.finish(MORPH_WORK)
+            yield sequence(scene, mesh, worn, clip, work.tick, started)
         started = time.perf_counter()
 
 
@@ -158,11 +174,12 @@ def _drape(scene: Scene, mesh: GarmentMesh, worn: WornGarment, work: _Work, star
         work.finish(MORPH_WORK)
         tolerance, steps = scene.solver.settle_tolerance, scene.solver.settle_steps
         rest = settle(worn.sim, tolerance, steps, next_step, worn.remesh)
-        state = _state(worn)
+        recording = Recording(worn, mesh)
+        recording.take()
     except SimulationError as error:
         raise stopped(f"scene {scene.name}, drape", error, worn.sim) from error
     work.finish(scene.solver.settle_steps)
-    return _sample(scene, [_mesh(worn, mesh)], worn, [worn.sim.positions], [state], rest, started)
+    return recording.sample(scene, rest, started)
 
 
 def _shared(scene: Scene) -> dict[str, object]:
@@ -177,97 +194,6 @@ def _clip(scene: Scene, model: BodyModel) -> Motion:
     assert scene.motion is not None
     m = scene.motion
     beta = _beta(scene, model)
-    clip = fit_to_body(load_motion(m.clip), model, beta)
+    clip = fit_to_body(read_motion(m), model, beta)
     clip = clip.clip(m.start, clip.duration if m.end is None else m.end)
     return spread_arms(clip, model, beta)[0] if m.spread_arms else clip
-
-
-def _sequence(
-    scene: Scene,
-    mesh: GarmentMesh,
-    worn: WornGarment,
-    clip: Motion,
-    work: _Work,
-    started: float,
-) -> Sample:
-    assert scene.motion is not None
-    m = scene.motion
-    substeps = scene.solver.substeps(m.fps)
-    step_rate = m.fps * substeps
-    way_in = lead_in(clip, LEAD_IN_SECONDS, step_rate)
-    worn.carry(way_in.poses[0], way_in.translations[0])
-    frames = int(np.floor(clip.duration * m.fps + 1e-6)) + 1
-    times = np.arange((frames - 1) * substeps + 1) / step_rate
-    poses, translations = clip.at(times)
-    path = [*zip(way_in.poses[1:], way_in.translations[1:], strict=True)]
-    path += [*zip(poses[1:], translations[1:], strict=True)]
-    positions, meshes, states = [], [], []
-    next_step = with_budget(worn.sim, scene.solver.max_work, work.tick)
-    for k, (theta, translation) in enumerate(path):
-        passed = k + 1 - (len(way_in.poses) - 1)
-        if (passed - 1) % substeps == 0:
-            worn.sim.work_left = scene.solver.max_work
-        try:
-            worn.follow(theta, translation, 1.0 / step_rate)
-            worn.remesh()
-            if passed == 0:
-                steps = scene.solver.settle_steps // 3
-                settle(worn.sim, scene.solver.settle_tolerance, steps, next_step, worn.remesh)
-                work.finish(MORPH_WORK)
-            if passed >= 0 and passed % substeps == 0:
-                positions.append(worn.sim.positions)
-                meshes.append(_mesh(worn, mesh))
-                states.append(_state(worn))
-                work.tick()
-        except SimulationError as error:
-            where = "lead-in" if passed <= 0 else f"frame {passed // substeps}"
-            raise stopped(f"scene {scene.name}, {where}", error, worn.sim) from error
-    return _sample(scene, meshes, worn, positions, states, None, started, clip)
-
-
-def _mesh(worn: WornGarment, begun: GarmentMesh) -> GarmentMesh:
-    """The mesh that the cloth has now; `begun`, with which it was put on, unless it is remeshed."""
-    return begun if worn.remesher is None else worn.remesher.mesh
-
-
-_State = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32], float]
-
-
-def _state(worn: WornGarment) -> _State:
-    return worn.theta, worn.translation, worn.masked_faces(), worn.sim.contact.smallest_distance(worn.sim.x)
-
-
-def _sample(
-    scene: Scene,
-    meshes: list[GarmentMesh],
-    worn: WornGarment,
-    positions: list[NDArray[np.float64]],
-    states: list[_State],
-    rest: RestReport | None,
-    started: float,
-    clip: Motion | None = None,
-) -> Sample:
-    assert scene.body is not None
-    track = BodyTrack(
-        model=scene.body.model,
-        digest=worn.model.digest,
-        beta=worn.beta,
-        poses=np.array([state[0] for state in states]),
-        translations=np.array([state[1] for state in states]),
-    )
-    sample = sample_of_frames(
-        meshes,
-        positions,
-        id=scene.name,
-        kind="drape" if scene.motion is None else "sequence",
-        certificate=Certificate(),
-        fps=None if scene.motion is None else scene.motion.fps,
-        body=track,
-        masked_faces=tuple(state[2] for state in states),
-        fabric="+".join(dict.fromkeys(fabric.name for fabric in worn.sim.cloth.fabrics)),
-        scene=scene.model_dump(mode="json"),
-        seed=scene.seed,
-        labels={"sequence": clip.name, "motion_source": clip.source} if clip is not None else {},
-    )
-    distance = min(state[3] for state in states)
-    return certify_rounded(sample, solved(scene, distance, rest, started, len(positions), worn.remesher))

@@ -11,7 +11,9 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
+from muslin.sim.motion_table import MotionTable
 from muslin.sim.remesh.settings import RemeshTable
+from muslin.sim.remesh.topology import MAX_DISTORTION
 from muslin.sim.table_errors import explain
 from muslin.sim.tables import ZERO, Finite, Positive, RepeatTable, Table, Vector
 from muslin.sim.toml_values import read_values
@@ -87,18 +89,17 @@ class BodyTable(Table):
     pose: Literal["a", "t"] = "a"
 
 
-class MotionTable(Table):
-    """`clip` by name or AMASS file, from `start` to `end` seconds of it, stored at `fps` frames a second.
+class TopologyTable(Table):
+    """Another triangulation of the garment, of triangles of `target_area` m^2 in the mean, drawn by `seed`.
 
-    `spread_arms` turns arms that sink into this body's trunk or thighs outwards, as `muslin.sim.motion.arms`
-    tells.
+    With `fit` the scene is simulated on the garment's own mesh, and the other one fitted to the result in
+    every frame; without, the other mesh is simulated.
     """
 
-    clip: str
-    start: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
-    end: Positive | None = None
-    fps: Annotated[float, Field(gt=0.0, le=240.0)] = 30.0
-    spread_arms: bool = True
+    seed: Annotated[int, Field(ge=0)] = 0
+    target_area: Annotated[float, Field(gt=0.0, le=1.0)]
+    max_distortion: Annotated[float, Field(gt=1.0, le=100.0)] = MAX_DISTORTION
+    fit: bool = True
 
 
 class SolverTable(Table):
@@ -161,6 +162,7 @@ class Scene(Table):
     air: AirTable | None = None
     solver: SolverTable = SolverTable()
     remesh: RemeshTable | None = None
+    topology: TopologyTable | None = None
     seed: Annotated[int, Field(ge=0)] = 0
     expect: ExpectTable = ExpectTable()
 
@@ -173,6 +175,10 @@ class Scene(Table):
                 raise ValueError(
                     f"{key} = {fabric!r}: unknown; choose one of {', '.join(fabric_names())}, or a FILE.toml"
                 )
+        if self.topology is not None and self.topology.fit and self.remesh is not None:
+            raise ValueError(
+                "[topology] is fitted to a mesh that stays; remove [remesh], or say topology.fit = false"
+            )
         if self.body is None:
             self._check_world()
         else:

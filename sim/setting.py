@@ -20,6 +20,7 @@ from muslin.sim.fabric_file import is_fabric_file, read_fabric
 from muslin.sim.material import Fabric, isotropic_fabric, load_fabric
 from muslin.sim.scene import FabricScale, GarmentTable, IsotropicTable, LayerTable, Scene
 from muslin.sim.solve.settings import SolverSettings
+from muslin.sim.topologies import retriangulated
 from muslin.sim.world.placing import copies
 
 
@@ -43,7 +44,7 @@ def garments_of(scene: Scene) -> list[Garment]:
     tables: list[GarmentTable] = [scene.garment, *scene.layers]
     found = []
     for table in tables:
-        fabric, mesh = fabric_of(scene, table), _cut(table)
+        fabric, mesh = fabric_of(scene, table), _mesh(scene, table)
         found += [(table, mesh, fabric, shift) for shift in copies(table.repeat)]
     names = [table.preset or mesh.name for table, mesh, _, _ in found]
     twice = {name for name in names if names.count(name) > 1}
@@ -92,6 +93,14 @@ def settings_of(scene: Scene) -> tuple[ContactSettings, SolverSettings]:
         air=None if scene.air is None else AirSettings(**scene.air.model_dump()),
     )
     return contact, solver
+
+
+def _mesh(scene: Scene, table: GarmentTable) -> GarmentMesh:
+    """The mesh of one garment that is simulated."""
+    mesh = _cut(table)
+    if scene.topology is None or scene.topology.fit:
+        return mesh
+    return retriangulated(mesh, scene.topology).mesh
 
 
 def _cut(g: GarmentTable) -> GarmentMesh:

@@ -15,6 +15,7 @@ from muslin.sim.contact.clearance import SelfClearance, room_for
 from muslin.sim.contact.system import ContactSettings
 from muslin.sim.dataset.intersections import crossed_body_faces
 from muslin.sim.layers import dress
+from muslin.sim.motion.rotations import axis_angle_from_quaternion, quaternion_from_axis_angle, slerp
 from muslin.sim.remesh.in_loop import Remesher
 from muslin.sim.solve.errors import SimulationError
 from muslin.sim.solve.settings import SolverSettings, StepReport
@@ -150,12 +151,33 @@ class WornGarment:
             if tick is not None:
                 tick()
 
-    def follow(self, theta: NDArray[np.float64], translation: NDArray[np.float64], dt: float) -> None:
+    def move(self, theta: NDArray[np.float64], translation: NDArray[np.float64], tick: Tick = None) -> None:
+        """Go to another pose and place at rest: garment and body as one piece to the new root, then the other
+        joints by slerp, in steps in which no body vertex moves more than `MORPH_MOVE`."""
+        self.carry(theta, translation)
+        far = self.model.vertices(self.beta, theta, translation) - self.body()
+        steps = int(np.ceil(np.linalg.norm(far, axis=1).max() / MORPH_MOVE))
+        begin, end = quaternion_from_axis_angle(self.theta), quaternion_from_axis_angle(theta)
+        for k in range(1, steps + 1):
+            share = np.full((1, 1), k / steps)
+            between = axis_angle_from_quaternion(slerp(begin, end, share)) if k < steps else theta
+            self.follow(between, translation, MORPH_DT, inertia=False)
+            if tick is not None:
+                tick()
+
+    def follow(
+        self,
+        theta: NDArray[np.float64],
+        translation: NDArray[np.float64],
+        dt: float,
+        *,
+        inertia: bool = True,
+    ) -> None:
         """One time step of `dt` seconds in which the body goes to a new pose."""
         before = (self.theta, self.translation)
         self.theta, self.translation = theta, translation
         try:
-            advance_on_body(self.sim, self.clearance, self.body(), dt)
+            advance_on_body(self.sim, self.clearance, self.body(), dt, inertia=inertia)
         except Exception:
             self.theta, self.translation = before
             raise

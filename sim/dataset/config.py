@@ -20,13 +20,17 @@ beta = [0.5, -1.0]                              # or random = { count, component
 [[shapes]]                                      # 5 shapes along one component
 sweep = { component = 0, start = -2.0, stop = 2.0, count = 5 }
 
-[[sequences]]
+[[sequences]]                                   # the keys of a scene's [motion], and who makes it
 clip = "cmu_07_01"
 end = 4.0
 designs = ["tshirt"]
 
+[topologies]                                    # every drape in 20 more triangulations of its design
+count = 20
+target_area = [2.5e-4, 5e-4]
+
 [splits.test]                                   # the first that names a sample takes it; the rest is "train"
-designs = ["random-019"]
+designs = ["random-01*"]
 [splits.validation]
 by = "shape"
 fraction = 0.1
@@ -41,8 +45,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from muslin.garments.errors import InputError
+from muslin.sim.dataset.presets import with_preset
+from muslin.sim.motion_table import MotionSource, WalkTable, WarpTable
+from muslin.sim.remesh.topology import MAX_DISTORTION
 from muslin.sim.scene import ExpectTable
-from muslin.sim.toml_values import read_values
+from muslin.sim.toml_values import read_values, set_value
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=60)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -106,34 +113,50 @@ class Shape(_Strict):
         return self
 
 
-class MotionClip(_Strict):
-    """A motion on every design (or those named), on the mean shape (or those named)."""
+class MotionClip(MotionSource):
+    """A motion on every design (or those named), on the mean shape (or those named), in the scene's mode of
+    motion or in its own. Names may be patterns, as those of `Split`."""
 
     name: Name | None = None
-    clip: str
-    start: float = Field(default=0.0, ge=0, allow_inf_nan=False)
-    end: float | None = Field(default=None, gt=0, allow_inf_nan=False)
-    fps: float = Field(default=30.0, gt=0, le=1000)
+    mode: Literal["dynamic", "quasi-static"] | None = None
     designs: list[str] | None = None
     shapes: list[str] | None = None
 
+
+class Topologies(_Strict):
+    """Every drape in `count` other triangulations of its design, t00, t01, …, the same in all its drapes.
+
+    Each is drawn by the dataset's seed, the design's name and its own number, so that more of them change
+    none. `target_area`: mean area of a triangle, m^2, or a range in which each draws its own. With mode "fit"
+    they are fitted to the one drape of the design's own mesh, with "simulate" each is simulated itself;
+    `keep_source`: whether the drape of the design's own mesh is a sample too, of topology "source".
+    """
+
+    count: int = Field(ge=1, le=1000)
+    target_area: Annotated[float, Field(gt=0)] | tuple[Finite, Finite]
+    max_distortion: float = Field(default=MAX_DISTORTION, gt=1, le=100)
+    mode: Literal["fit", "simulate"] = "fit"
+    keep_source: bool = True
+
     @model_validator(mode="after")
-    def _forward(self) -> MotionClip:
-        if self.end is not None and self.end <= self.start:
-            raise ValueError(f"end = {self.end} must be later than start = {self.start}")
+    def _range(self) -> Topologies:
+        if isinstance(self.target_area, tuple) and not 0.0 < self.target_area[0] <= self.target_area[1]:
+            raise ValueError(f"target_area = {list(self.target_area)} must be [low, high], above 0 m^2")
         return self
 
 
 class Split(_Strict):
-    """Names of designs, shapes and sequences, or a fraction of one of the three, drawn by the seed.
+    """Names of designs, shapes, sequences and topologies, or a fraction of one of these, drawn by the seed.
 
-    A drawn member stays in its split when the dataset is extended, so the share is met only on average.
+    A name may be a pattern: `*` stands for anything, `?` for one character, `[13579]` for one of these. A
+    drawn member stays in its split when the dataset is extended, so the share is met only on average.
     """
 
     designs: list[str] = []
     shapes: list[str] = []
     sequences: list[str] = []
-    by: Literal["design", "shape", "sequence"] | None = None
+    topologies: list[str] = []
+    by: Literal["design", "shape", "sequence", "topology"] | None = None
     fraction: float | None = Field(default=None, gt=0, lt=1)
 
     @model_validator(mode="after")
@@ -144,7 +167,7 @@ class Split(_Strict):
 
 
 class DatasetConfig(_Strict):
-    """A dataset. `chain` is the most drapes that follow one another along beta in one process."""
+    """A dataset. `chain` is the most shapes that follow one another along beta in one process."""
 
     name: Name = "dataset"
     seed: int = Field(default=0, ge=0, lt=2**63)
@@ -155,16 +178,21 @@ class DatasetConfig(_Strict):
     shapes: list[Shape] = []
     fabrics: list[str] = []
     sequences: list[MotionClip] = []
+    topologies: Topologies | None = None
     splits: dict[Name, Split] = {}
     expect: ExpectTable = ExpectTable()
 
 
-def load_config(path: str | Path, overrides: Sequence[str] = ()) -> DatasetConfig:
-    """Read a dataset's TOML file; `overrides` are "dotted.key=value" with TOML values.
+def load_config(path: str | Path, overrides: Sequence[str] = (), preset: str | None = None) -> DatasetConfig:
+    """Read a dataset's TOML file, one of its presets merged over it (`with_preset`), if one is asked for;
+    `overrides`, which come last, are "dotted.key=value" with TOML values.
 
     Raises InputError naming file, key, value and what is allowed.
     """
-    values = read_values(path, "dataset", overrides, "scene.fabric=gray-interlock")
+    example = "scene.fabric=gray-interlock"
+    values = with_preset(read_values(path, "dataset", (), example), preset, str(path))
+    for override in overrides:
+        set_value(values, override, example)
     return parse_config(values, str(path))
 
 
@@ -185,17 +213,20 @@ def _explain(entry: Any) -> str:
     return f"{key}{value}: {entry['msg'].removeprefix('Value error, ')}"
 
 
-_TABLES: dict[str, type[_Strict]] = {
+_TABLES: dict[str, type[BaseModel]] = {
     "designs": Design,
     "shapes": Shape,
     "sequences": MotionClip,
+    "topologies": Topologies,
     "splits": Split,
     "sweep": Sweep,
+    "warp": WarpTable,
+    "random_walk": WalkTable,
 }
 
 
 def _keys_beside(location: tuple[Any, ...]) -> list[str]:
-    model: type[_Strict] = DatasetConfig
+    model: type[BaseModel] = DatasetConfig
     for part in location[:-1]:
         if part == "random":
             model = RandomDesigns if model is Design else RandomShapes

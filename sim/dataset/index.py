@@ -24,6 +24,7 @@ COLUMNS = pa.schema(
         ("design", pa.string()),
         ("shape", pa.string()),
         ("sequence", pa.string()),
+        ("topology", pa.string()),
         ("fabric", pa.string()),
         ("body", pa.string()),
         ("frames", pa.int64()),

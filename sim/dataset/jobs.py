@@ -21,7 +21,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Chain:
-    """Jobs of one process: drapes along beta, each starting from the one before, or one sequence."""
+    """Jobs of one process: drapes along beta, each simulation starting from the one before, or one sequence.
+
+    Drapes that differ in nothing but the topology fitted to them stand side by side: one simulation."""
 
     jobs: tuple[Job, ...]
 

@@ -7,19 +7,21 @@ import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
 from muslin.garments import catalogue
 from muslin.garments.errors import InputError
-from muslin.sim.dataset.config import DatasetConfig, Design, MotionClip, Shape
+from muslin.sim.dataset.config import DatasetConfig, Design, MotionClip, Shape, Split, Topologies
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.jobs import Chain, Job, Plan
 
 TRAIN = "train"
 MEAN_SHAPE = "mean"
+SOURCE_TOPOLOGY = "source"
+"""The topology label of drapes on a design's own mesh, where they are given on others too."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,14 @@ class _Beta:
     beta: list[float] | None
 
 
+@dataclass(frozen=True)
+class _Topology:
+    """A label, and the table of the scene; without a label where a dataset has no topologies."""
+
+    label: str
+    table: dict[str, Any] | None
+
+
 def plan(config: DatasetConfig) -> Plan:
     """All chains of a dataset.
 
@@ -42,7 +52,7 @@ def plan(config: DatasetConfig) -> Plan:
     """
     designs = list(_designs(config))
     shapes = list(_shapes(config))
-    clips = [(clip.name or Path(clip.clip).stem, clip) for clip in config.sequences]
+    clips = [(clip.name or clip.usual_name, clip) for clip in config.sequences]
     _check_unique("designs", [garment.name for garment in designs])
     _check_unique("shapes", [shape.name for shape in shapes])
     _check_unique("sequences", [name for name, _ in clips])
@@ -63,16 +73,43 @@ def plan(config: DatasetConfig) -> Plan:
 def _drapes(
     config: DatasetConfig, garment: _Garment, fabric: str | None, shapes: Sequence[_Beta]
 ) -> Iterator[Chain]:
-    for first in range(0, len(shapes), config.chain):
-        jobs: list[Job] = []
-        before: list[Any] = []
-        for shape in shapes[first : first + config.chain]:
-            scene = _scene(config, garment, fabric, shape, None)
-            labels = {"design": garment.name, "shape": shape.name, "fabric": fabric or ""}
-            # A drape starts from its neighbour's, so what came before it is part of what it is.
-            jobs.append(_job(config, "drape", scene, labels, {"scene": scene, "before": before}))
-            before = [*before, shape.beta]
-        yield Chain(tuple(jobs))
+    for together in _topologies(config, garment):
+        for first in range(0, len(shapes), config.chain):
+            jobs: list[Job] = []
+            before: list[Any] = []
+            for shape in shapes[first : first + config.chain]:
+                for topology in together:
+                    scene = _scene(config, garment, fabric, shape, None)
+                    if topology.table is not None:
+                        scene["topology"] = topology.table
+                    labels = {"design": garment.name, "shape": shape.name, "fabric": fabric or ""}
+                    labels["topology"] = topology.label
+                    # A drape starts from its neighbour's, so what came before it is part of what it is.
+                    jobs.append(_job(config, "drape", scene, labels, {"scene": scene, "before": before}))
+                before = [*before, shape.beta]
+            yield Chain(tuple(jobs))
+
+
+def _topologies(config: DatasetConfig, garment: _Garment) -> list[list[_Topology]]:
+    """The topologies in which a garment is to be draped, those of one simulation together."""
+    asked = config.topologies
+    if asked is None:
+        return [[_Topology("", None)]]
+    source = [_Topology(SOURCE_TOPOLOGY, None)] if asked.keep_source else []
+    drawn = [_drawn_topology(config, asked, garment, k) for k in range(asked.count)]
+    if asked.mode == "fit":
+        return [source + drawn]
+    return [[topology] for topology in source + drawn]
+
+
+def _drawn_topology(config: DatasetConfig, asked: Topologies, garment: _Garment, number: int) -> _Topology:
+    draw = _generator(config.seed, "topology", garment.name, str(number))
+    area = asked.target_area
+    if isinstance(area, tuple):
+        area = float(f"{area[0] + (area[1] - area[0]) * draw.random():.3g}")
+    seed = int(draw.integers(2**31))
+    table = {"seed": seed, "target_area": area, "max_distortion": asked.max_distortion}
+    return _Topology(f"t{number:02d}", table | {"fit": asked.mode == "fit"})
 
 
 def _sequences(
@@ -82,12 +119,11 @@ def _sequences(
     shapes: Sequence[_Beta],
     clips: Sequence[tuple[str, MotionClip]],
 ) -> Iterator[Chain]:
-    by_name = {shape.name: shape for shape in shapes}
     for name, clip in clips:
-        if clip.designs is not None and garment.name not in clip.designs:
+        if clip.designs is not None and not _named(garment.name, clip.designs):
             continue
         wanted = (
-            [by_name[shape] for shape in clip.shapes]
+            [shape for shape in shapes if _named(shape.name, clip.shapes)]
             if clip.shapes is not None
             else [_Beta(MEAN_SHAPE, None)]
         )
@@ -111,19 +147,21 @@ def _scene(
     if fabric is not None:
         scene["fabric"] = fabric
     if clip is not None:
-        scene["motion"] = motion | {"clip": clip.clip, "start": clip.start, "fps": clip.fps}
-        if clip.end is not None:
-            scene["motion"]["end"] = clip.end
+        given = clip.model_dump(mode="json", exclude_defaults=True, exclude={"name", "designs", "shapes"})
+        scene["motion"] = motion | {"start": clip.start, "fps": clip.fps} | given
     return scene
 
 
 _GARMENT_SOURCES = ("design", "preset", "parameters", "pattern", "mesh")
 
 
+_ID_LABELS = ("design", "shape", "sequence", "topology")
+
+
 def _job(
     config: DatasetConfig, kind: str, scene: dict[str, Any], labels: dict[str, str], identity: dict[str, Any]
 ) -> Job:
-    words = [re.sub(r"[^A-Za-z0-9-]+", "-", labels.get(key, "")) for key in ("design", "shape", "sequence")]
+    words = [re.sub(r"[^A-Za-z0-9-]+", "-", labels.get(key, "")) for key in _ID_LABELS]
     sample_id = "_".join([*filter(None, words), digest(identity)[:12]])
     return Job(
         sample_id, kind, scene, {k: v for k, v in labels.items() if v}, _split(config, labels), config.seed
@@ -212,16 +250,29 @@ def _generator(seed: int, *words: str) -> np.random.Generator:
     return np.random.default_rng(list(hashlib.sha256("/".join([str(seed), *words]).encode()).digest()))
 
 
+def _named(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
 def _split(config: DatasetConfig, labels: dict[str, str]) -> str:
-    design, shape, sequence = labels["design"], labels["shape"], labels.get("sequence", "")
     for name, split in config.splits.items():
-        if design in split.designs or shape in split.shapes or sequence in split.sequences:
-            return name
+        for key, patterns in _split_names(split).items():
+            if labels.get(key) and _named(labels[key], patterns):
+                return name
         if split.by is not None and split.fraction is not None and labels.get(split.by):
             member = digest([config.seed, name, split.by, labels[split.by]])
             if int(member[:13], 16) < split.fraction * 16**13:
                 return name
     return TRAIN
+
+
+def _split_names(split: Split) -> dict[str, list[str]]:
+    return {
+        "design": split.designs,
+        "shape": split.shapes,
+        "sequence": split.sequences,
+        "topology": split.topologies,
+    }
 
 
 def _check_unique(key: str, names: Sequence[str]) -> None:
@@ -234,23 +285,25 @@ def _check_splits(
     config: DatasetConfig, designs: Sequence[_Garment], shapes: Sequence[_Beta], sequences: Sequence[str]
 ) -> None:
     known = {
-        "designs": {garment.name for garment in designs},
-        "shapes": {shape.name for shape in shapes} | {MEAN_SHAPE},
-        "sequences": set(sequences),
+        "design": {garment.name for garment in designs},
+        "shape": {shape.name for shape in shapes} | {MEAN_SHAPE},
+        "sequence": set(sequences),
+        "topology": {t.label for group in _topologies(config, designs[0]) for t in group} - {""},
     }
     for place, clip in enumerate(config.sequences):
-        for key in ("designs", "shapes"):
-            _check_names(f"sequences.{place}.{key}", getattr(clip, key) or [], known[key] - {MEAN_SHAPE})
+        _check_names(f"sequences.{place}.designs", clip.designs or [], known["design"])
+        _check_names(f"sequences.{place}.shapes", clip.shapes or [], known["shape"] - {MEAN_SHAPE})
     for name, split in config.splits.items():
-        for key, allowed in known.items():
-            _check_names(f"splits.{name}.{key}", getattr(split, key), allowed)
+        for key, patterns in _split_names(split).items():
+            plural = "topologies" if key == "topology" else f"{key}s"
+            _check_names(f"splits.{name}.{plural}", patterns, known[key])
 
 
-def _check_names(key: str, names: Sequence[str], allowed: set[str]) -> None:
-    for name in names:
-        if name not in allowed:
+def _check_names(key: str, patterns: Sequence[str], allowed: set[str]) -> None:
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in allowed):
             some = ", ".join(sorted(allowed)[:8]) or "none"
-            raise InputError(f"{key}: {name!r} is the name of none; allowed: {some}")
+            raise InputError(f"{key}: {pattern!r} is the name of none; allowed: {some}")
 
 
 def _check_jobs(config: DatasetConfig, result: Plan) -> None:

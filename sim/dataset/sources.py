@@ -8,7 +8,7 @@ from muslin.garments import catalogue
 from muslin.garments.pattern_file import read_pattern
 from muslin.sim.body.load import load_body
 from muslin.sim.fabric_file import is_fabric_file, read_fabric
-from muslin.sim.motion.clips import load_motion
+from muslin.sim.motion_table import read_motion
 from muslin.sim.scene import GarmentTable, MotionTable, Scene
 
 
@@ -40,7 +40,7 @@ def _new(known: set[str], key: str) -> bool:
 
 
 def _check_motion(motion: MotionTable) -> None:
-    clip = load_motion(motion.clip)
+    clip = read_motion(motion)
     clip.clip(motion.start, clip.duration if motion.end is None else motion.end)
 
 

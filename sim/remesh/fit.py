@@ -20,14 +20,20 @@ Array = NDArray[np.float64]
 
 
 def fit(remeshed: Remeshed, positions: Array) -> Remeshed:
-    """The same topology at the positions that describe the drape best: the L2 projection over panel space,
+    """The same topology at the positions that describe the drape of `positions` (V, 3), metres, best: see
+    `Projection`."""
+    return Projection(remeshed).fit(positions)
+
+
+class Projection:
+    """The L2 projection over panel space, of any drape of the source onto another topology:
 
         min_x  int |sum_i phi_i(p) x_i - y(p)|^2 dp,   that is   M x = b,
         M_ij = int phi_i phi_j,   b_i = int phi_i y,
 
     phi_i the hat functions of the new mesh, one a sewn vertex, so that seams stay sewn; y(p) the source's
-    surface of `positions` (V, 3), metres. Interpolation instead puts vertices on the surface and cuts all
-    corners between them on the inner side of bends.
+    surface. Interpolation instead puts vertices on the surface and cuts all corners between them on the inner
+    side of bends.
 
     Integrals are sums over the three edge midpoints, exact for squares, of triangles into which those of the
     new mesh are divided until they are as small as the source's. So M is exact, and what is linear over panel
@@ -36,15 +42,20 @@ def fit(remeshed: Remeshed, positions: Array) -> Remeshed:
 
     The surface no longer goes through the source's vertices, and no bound keeps it off the body: `untangle`.
     """
-    mesh = remeshed.mesh
-    face, weights, area = _quadrature(mesh, float(remeshed.source.face_areas.mean()))
-    y = _surface(remeshed, np.asarray(positions, dtype=np.float64), face, weights)
-    rows = np.repeat(np.arange(len(face)), 3)
-    shape = len(face), mesh.num_vertices
-    phi = csr_matrix((weights.ravel(), (rows, mesh.faces[face].ravel())), shape=shape)
-    weighted = phi.multiply(area[:, None]).T.tocsr()
-    solved = splu(csc_matrix(weighted @ phi)).solve(weighted @ y)
-    return replace(remeshed, positions=solved)
+
+    def __init__(self, remeshed: Remeshed) -> None:
+        self.remeshed = remeshed
+        mesh, source = remeshed.mesh, remeshed.source
+        face, weights, area = _quadrature(mesh, float(source.face_areas.mean()))
+        phi = _matrix(mesh.faces[face], weights, mesh.num_vertices)
+        weighted = phi.multiply(area[:, None]).T.tocsr()
+        self._right = weighted @ _matrix(*_in_source(remeshed, face, weights), source.num_vertices)
+        self._mass = splu(csc_matrix(weighted @ phi))
+
+    def fit(self, positions: Array) -> Remeshed:
+        """The topology at the positions for a drape of the source, (V, 3), metres."""
+        solved = self._mass.solve(self._right @ np.asarray(positions, dtype=np.float64))
+        return replace(self.remeshed, positions=solved)
 
 
 def transfer_error(remeshed: Remeshed, positions: Array) -> Array:
@@ -99,10 +110,18 @@ def _midpoints(n: int) -> Array:
     return np.column_stack([1.0 - parts.sum(axis=1), parts])
 
 
-def _surface(remeshed: Remeshed, positions: Array, face: NDArray[np.int64], weights: Array) -> Array:
-    """(Q, 3) the source's surface at points of new faces; linear beyond its panels."""
+def _in_source(
+    remeshed: Remeshed, face: NDArray[np.int64], weights: Array
+) -> tuple[NDArray[np.int32], Array]:
+    """Vertices (Q, 3) of the source's surface and their weights (Q, 3) at points of new faces."""
     source, mesh = remeshed.source, remeshed.mesh
     place = np.einsum("qk,qkj->qj", weights, mesh.panel_vertices[mesh.panel_faces[face]])
     found, _ = PanelSpace(source).locate(place, mesh.face_panel[face])
     within = barycentric(source.panel_vertices[source.panel_faces[found]], place)
-    return np.einsum("qk,qkj->qj", within, positions[source.faces[found]])
+    return source.faces[found], within
+
+
+def _matrix(vertices: NDArray[np.int32], weights: Array, count: int) -> csr_matrix:
+    """(Q, count) of weights (Q, 3) at vertices (Q, 3)."""
+    rows = np.repeat(np.arange(len(vertices)), 3)
+    return csr_matrix((weights.ravel(), (rows, vertices.ravel())), shape=(len(vertices), count))

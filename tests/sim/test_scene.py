@@ -97,7 +97,7 @@ def test_bad_override(scene_file, override, says):
         ("fabric=tin", ["fabric = 'tin'", "choose one of", "gray-interlock"]),
         ("name=a/b", ['name = "a/b"', "pattern"]),
         ("motion.clip=3", ["motion.clip = 3", "string"]),
-        ("motion={end = 1.0}", ["motion.clip is missing"]),
+        ("motion={end = 1.0}", ["motion = ", "exactly one of clip and random_walk"]),
         ("fabric={young = 1e6, poisson = 0.3}", ["fabric.thickness is missing"]),
         ("fabric={young = 0}", ["fabric.young = 0", "greater than 0"]),
         (

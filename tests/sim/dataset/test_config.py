@@ -98,7 +98,7 @@ def test_wrong_overrides(demo: Path, override: str, message: str) -> None:
         ({"sequences": [{"clip": "a", "start": 2.0, "end": 1.0}]}, "must be later than start"),
         ({"sequences": [{"clip": "a", "fps": 0}]}, "greater than 0"),
         ({"splits": {"test": {"by": "design"}}}, "by and fraction together"),
-        ({"splits": {"test": {"by": "colour", "fraction": 0.1}}}, "'design', 'shape' or 'sequence'"),
+        ({"splits": {"test": {"by": "colour", "fraction": 0.1}}}, "'sequence' or 'topology'"),
     ],
 )
 def test_wrong_values(values: dict, message: str) -> None:
