@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from muslin.eval.cli.options import DatasetPlace
+
 
 def info(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    dataset: DatasetPlace,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     samples: Annotated[bool, typer.Option("--samples", help="List the samples too.")] = False,
 ) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from muslin.garments.errors import InputError
+
+if TYPE_CHECKING:
+    from muslin.sim.dataset.engine import Cluster
 
 Overrides = Annotated[
     list[str] | None,
@@ -19,6 +22,20 @@ Overrides = Annotated[
 Device = Annotated[str, typer.Option("--device", help="cpu, or cuda:0 (cuda:1 …).")]
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes; by default one a processor core.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Use the workers of this dask scheduler instead."),
+]
+Memory = Annotated[
+    str,
+    typer.Option("--memory", metavar="SIZE", help="Of a worker, such as 4GB; by default an equal share."),
+]
+Retries = Annotated[
+    int, typer.Option("--retries", min=0, help="Tries more for samples over which a worker died.")
+]
+DatasetPlace = Annotated[
+    str, typer.Argument(metavar="DIR", help="The dataset: a folder, or a URL such as s3://bucket/name.")
 ]
 SampleId = Annotated[
     str | None, typer.Option("--sample", metavar="ID", help="The sample; see `muslin info DIR --samples`.")
@@ -31,6 +48,15 @@ def check_device(device: str) -> str:
     if not re.fullmatch(r"cpu|cuda(:\d+)?", device):
         raise InputError(f"--device {device!r} is not allowed; it must be cpu or cuda:0 (cuda:1 …)")
     return "cuda:0" if device == "cuda" else device
+
+
+def cluster_of(workers: int | None, scheduler: str | None, memory: str, retries: int, device: str) -> Cluster:
+    """The cluster that the options ask for. Raises InputError for options that exclude each other."""
+    from muslin.sim.dataset.engine import Cluster
+
+    if scheduler is not None and workers is not None:
+        raise InputError("--workers and --scheduler exclude each other: a scheduler has workers of its own")
+    return Cluster(workers or (None if device == "cpu" else 1), scheduler, memory, retries)
 
 
 def check_new(path: Path, force: bool = False) -> Path:

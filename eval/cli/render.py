@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from muslin.eval.cli.options import Force, SampleId, check_new
+from muslin.eval.cli.options import DatasetPlace, Force, SampleId, check_new
 from muslin.garments.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ MOST_IN_SHEET = 24
 
 
 def render(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    dataset: DatasetPlace,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="FILE.png, .gif or .mp4.")],
     sample_id: SampleId = None,
     frame: Annotated[int, typer.Option("--frame", min=0, help="Of a sequence, for .png.")] = 0,

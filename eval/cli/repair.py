@@ -2,42 +2,65 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from muslin.eval.cli.options import Device, Workers, check_device
+from muslin.eval.cli.options import (
+    DatasetPlace,
+    Device,
+    Memory,
+    Retries,
+    Scheduler,
+    Workers,
+    check_device,
+    cluster_of,
+)
+from muslin.eval.cli.stopping import terminated_like_interrupted
 
 
 def repair(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    dataset: DatasetPlace,
     workers: Workers = None,
     device: Device = "cpu",
+    samples: Annotated[
+        list[str] | None, typer.Option("--sample", metavar="ID", help="Only this sample. Repeatable.")
+    ] = None,
+    scheduler: Scheduler = None,
+    memory: Memory = "auto",
+    retries: Retries = 3,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="List what is damaged or missing; write nothing.")
     ] = False,
 ) -> None:
     """Verify every sample; make again what fails or is missing, as `muslin generate` made it.
 
-    What is there of a sample that fails is moved to DIR/failed, never deleted. Exit code 1, and the list on
+    What is there of a sample that fails is moved to DIR/failed, never deleted; samples in quarantine are
+    tried again. Exit code 1, and the list on
     standard error, if not all is well afterwards (with --dry-run: now).
 
     \b
     Examples:
       muslin repair out/demo --dry-run
       muslin repair out/demo --workers 8
+      muslin repair out/demo --sample tshirt_mid_0123456789ab --workers 1
     """
     from muslin.eval.cli.progress import progress_bar
     from muslin.sim.dataset.repair import repair as run
 
     name = check_device(device)
-    with progress_bar("repair") as update:
-
-        def progress(done: float, total: int, message: str) -> None:
-            update(done, total, message)
-
-        result = run(dataset, workers=workers, device=name, dry=dry_run, progress=progress)
+    cluster = cluster_of(workers, scheduler, memory, retries, name)
+    note = f"{dataset}: what was finished is kept; run again to go on"
+    with terminated_like_interrupted(note), progress_bar("repair") as update:
+        result = run(
+            dataset,
+            ids=samples or None,
+            workers=workers,
+            cluster=cluster,
+            device=name,
+            dry=dry_run,
+            progress=update,
+        )
     for sample_id, reason in result.damaged.items():
         place = result.aside.get(sample_id)
         typer.echo(f"  {sample_id}: {reason}" + (f"; set aside as {place}" if place else ""))

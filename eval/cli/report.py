@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from muslin.eval.cli.options import Workers, make_parent
+from muslin.eval.cli.options import DatasetPlace, Workers, make_parent
 from muslin.garments.errors import InputError
 
 KEYS = {"cloth_cloth_intersections", "cloth_body_intersections", "failed"}
 
 
 def report(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    dataset: DatasetPlace,
     html_file: Annotated[
         Path, typer.Option("--html", metavar="FILE", help="The page, replacing the last one.")
     ],

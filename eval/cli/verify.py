@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from muslin.eval.cli.options import Workers, make_parent
+from muslin.eval.cli.options import DatasetPlace, Workers, make_parent
 
 
 def verify(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")],
+    dataset: DatasetPlace,
     json_file: Annotated[
         Path | None,
         typer.Option("--json", metavar="FILE", help="Write the result there, replacing the last."),

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from muslin.eval.cli.options import SampleId
+from muslin.eval.cli.options import DatasetPlace, SampleId
 from muslin.garments.errors import InputError
 
 
-def view(
-    dataset: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset.")], sample_id: SampleId = None
-) -> None:
+def view(dataset: DatasetPlace, sample_id: SampleId = None) -> None:
     """Open a window with a sample (the first, unless told): turn it with the mouse, slide through its frames.
 
     \b

@@ -171,7 +171,8 @@ class _Run:
                 if isinstance(event, Done):
                     self._finished(event.place, order[event.place], event.found)
                 elif isinstance(event, News):
-                    self.tally.news(event.place, *event.said, len(order[event.place].wanted))
+                    share, at = event.said
+                    self.tally.news(event.place, share, at, len(order[event.place].wanted))
                 else:
                     self.tally.tick()
                 if time.monotonic() - written > INDEX_S:

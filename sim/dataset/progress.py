@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Protocol
 
 from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.schema import PROGRESS
@@ -14,11 +14,9 @@ FILE_S = 15.0
 """Between two writings of the file."""
 
 
-class Progress(Protocol):
-    """What long work tells while it runs."""
-
-    def __call__(self, done: float, total: int, message: str) -> None:
-        """done: items finished, with the begun ones in parts; total: items there are; 0 while not known."""
+Progress = Callable[[float, int, str], None]
+"""Called with (done, total, message) while long work runs: items finished, with the begun ones in parts;
+items there are, 0 while that is not known; what else there is to say."""
 
 
 @dataclass(frozen=True)
