@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -99,7 +100,7 @@ def generate(
     solver = solver_digest(simulate)
     header = Header(config=config.model_dump(mode="json"), splits=planned.splits, solver_digest=solver)
     before = prepare_root(root, header)
-    with root.lock():
+    with _unwritable_told(root), root.lock():
         stored = store.stored_ids(root)
         there = {sample_id for sample_id in stored if sample_id not in again}
         missing = frozenset(job.id for job in planned.jobs if job.id not in there)
@@ -180,8 +181,9 @@ class _Run:
                     written = time.monotonic()
         except BaseException:
             # However it ends, what was made is listed, so that nobody has to read it all to know.
-            write_index(self.root, self.header, self.rows)
-            self.tally.end("stopped")
+            with contextlib.suppress(OSError):  # the first error tells more
+                write_index(self.root, self.header, self.rows)
+                self.tally.end("stopped")
             raise
         self.tally.end("finished")
 
@@ -194,6 +196,8 @@ class _Run:
             self.tally.finished(place, len(wanted) - len(rest), len(rest))
             return
         self.busy += found.seconds
+        if found.store:
+            raise OSError(found.store)
         self.rows |= {row["id"]: row for row in found.rows}
         rest = wanted[len(found.rows) :]
         if found.failed:
@@ -208,6 +212,18 @@ class _Run:
         self.failed[sample_id] = reason
         for behind in rest[1:]:
             self.failed[behind] = f"comes after {sample_id} in its chain: {reason}"
+
+
+@contextlib.contextmanager
+def _unwritable_told(root: Root) -> Iterator[None]:
+    """A full disk or a store out of reach, as an InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{root}: cannot be written to ({error}); make room, or wait until the store is back, and run "
+            "again: what was finished is kept"
+        ) from error
 
 
 def _entry(

@@ -19,7 +19,7 @@ from muslin.sim.dataset.schema import LOCK
 
 Found = TypeVar("Found")
 
-WAITS_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+WAITS_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0)
 """Pauses between tries of an access that fails; the clients of stores try some times of their own at each."""
 
 

@@ -53,6 +53,7 @@ class Made:
 
     rows     index rows of the samples that were made
     failed   id of the sample at which the chain ended, with the reason and what a developer needs; or empty
+    store    why the store could not be written to, which is not the sample's fault; or empty
     seconds  that the worker was at it
     """
 
@@ -60,6 +61,7 @@ class Made:
     failed: str = ""
     reason: str = ""
     log: tuple[str, ...] = ()
+    store: str = ""
     seconds: float = 0.0
 
 
@@ -79,7 +81,11 @@ def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
         for job, sample in zip(task.chain.jobs, samples, strict=True):
             seconds = time.perf_counter() - started
             if job.id in task.missing:
-                rows.append(_commit(task.root, _named(job, sample, task, seconds)))
+                try:
+                    rows.append(_commit(task.root, _named(job, sample, task, seconds)))
+                except OSError as error:  # a full disk, or a store out of reach
+                    why = f"{type(error).__name__}: {error}"
+                    return Made(rows, store=why, seconds=time.perf_counter() - begun)
                 left.remove(job)
             if not left:
                 break
@@ -89,7 +95,7 @@ def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
         if isinstance(error, SimulationError) and error.state is not None:
             reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
         log = tuple(traceback.format_exc().splitlines())
-        return Made(rows, left[0].id, reason, log, time.perf_counter() - begun)
+        return Made(rows, left[0].id, reason, log, seconds=time.perf_counter() - begun)
     return Made(rows, seconds=time.perf_counter() - begun)
 
 
