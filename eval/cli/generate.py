@@ -43,6 +43,9 @@ def generate(
     memory: Memory = "auto",
     retries: Retries = 3,
     retry: Annotated[bool, typer.Option("--retry", help="Try samples in quarantine again.")] = False,
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="Draw some of the samples beside the card.")
+    ] = True,
 ) -> None:
     """Make every sample of a dataset that is not there yet.
 
@@ -68,7 +71,7 @@ def generate(
     cluster = cluster_of(workers, scheduler, memory, retries, name)
     note = f"{out}: what was finished is kept; run again to go on"
     with terminated_like_interrupted(note), progress_bar("generate") as update:
-        result = run(loaded, out, cluster=cluster, device=name, progress=update, retry=retry)
+        result = run(loaded, out, cluster=cluster, device=name, progress=update, retry=retry, picture=picture)
     typer.echo(f"{out}: {len(result.made)} samples made, {len(result.kept)} kept, {result.seconds:.1f} s")
     if not result.card:
         typer.echo(

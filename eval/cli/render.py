@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from muslin.sim.dataset.sample import Sample
 
 SUFFIXES = (".png", ".gif", ".mp4")
-SHEET_SIZE = (240, 320)
-MOST_IN_SHEET = 24
 
 
 def render(
@@ -30,7 +28,7 @@ def render(
     ] = 0.0,
     force: Force = False,
 ) -> None:
-    """Picture a dataset: .png one sample or, without --sample, a sheet of all; .gif and .mp4 a sequence.
+    """Picture a dataset: .png one sample, or without --sample some of all; .gif and .mp4 a sequence.
 
     A drape as .gif or .mp4 is turned round once. No display and no graphics driver are needed.
 
@@ -80,27 +78,22 @@ def _still(
 
     from muslin.eval.cli.progress import progress_bar
     from muslin.eval.page import write_atomically
+    from muslin.sim.view.overview import overview
     from muslin.sim.view.picture import AZIMUTH, picture
-    from muslin.sim.view.sheet import contact_sheet
 
     azimuth = AZIMUTH + float(np.deg2rad(turn))
     if sample_id is None and len(data) > 1:
-        pictures, captions = [], []
-        ids = data.ids[:MOST_IN_SHEET]
         with progress_bar("draw") as update:
-            for done, one in enumerate(ids, start=1):
-                pictures.append(picture(data[one], 0, SHEET_SIZE, azimuth))
-                captions.append(data.rows[done - 1]["design"] or one)
-                update(done, len(ids), one)
-        image = contact_sheet(pictures, 6, captions)
+            png = overview(data, azimuth, progress=update)
     else:
         sample = data[sample_id or 0]
         if frame >= sample.num_frames:
             raise InputError(f"--frame {frame}: sample {sample.id} has frames 0 to {sample.num_frames - 1}")
         image = picture(sample, frame, size, azimuth)
-    stream = io.BytesIO()
-    Image.fromarray(image).save(stream, "PNG")
-    write_atomically(out, stream.getvalue())
+        stream = io.BytesIO()
+        Image.fromarray(image).save(stream, "PNG")
+        png = stream.getvalue()
+    write_atomically(out, png)
 
 
 def _movie(sample: Sample, out: Path, size: tuple[int, int]) -> None:

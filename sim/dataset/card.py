@@ -13,7 +13,7 @@ from muslin.sim.dataset import licences
 from muslin.sim.dataset.header import Header, digest
 from muslin.sim.dataset.jobs import Job
 from muslin.sim.dataset.root import Root
-from muslin.sim.dataset.schema import CARD
+from muslin.sim.dataset.schema import CARD, PICTURE
 from muslin.sim.dataset.toml_text import toml_text
 
 MARK = "<!-- Dataset card, written anew by `muslin generate`. Take this line away to keep changes. -->"
@@ -33,15 +33,18 @@ def write_card(root: Root, header: Header, rows: Sequence[Mapping[str, Any]], jo
         pass
     except IsADirectoryError:
         return False
-    root.write(CARD, card_text(header, rows, jobs).encode())
+    root.write(CARD, card_text(header, rows, jobs, root.exists(PICTURE)).encode())
     return True
 
 
-def card_text(header: Header, rows: Sequence[Mapping[str, Any]], jobs: Iterable[Job]) -> str:
+def card_text(
+    header: Header, rows: Sequence[Mapping[str, Any]], jobs: Iterable[Job], picture: bool = False
+) -> str:
     """The card, Markdown: a function of what the dataset holds alone, so the same dataset has the same card.
 
-    rows   the index
-    jobs   the plan of the dataset; of those that are in `rows` it tells the parameters
+    rows      the index
+    jobs      the plan of the dataset; of those that are in `rows` it tells the parameters
+    picture   whether there is one beside it
 
     What differs from run to run or from place to place is left out: dates, computing time, bytes on disk, and
     the folders of files that the config names by absolute paths.
@@ -50,6 +53,7 @@ def card_text(header: Header, rows: Sequence[Mapping[str, Any]], jobs: Iterable[
     scenes = [job.scene for job in jobs if job.id in made]
     parts = [
         f"{MARK}\n# {header.config.get('name', 'dataset')}",
+        *([f"![Some of the samples]({PICTURE})"] if picture else []),
         _what(header, rows),
         "## Samples\n\n" + _counts(rows),
         "## Parameters\n\n" + _parameters(scenes),
@@ -91,7 +95,7 @@ def _range(label: str, values: Sequence[float]) -> str:
 
 def _counts(rows: Sequence[Mapping[str, Any]]) -> str:
     lines: list[list[object]] = []
-    for key in ("split", "design", "shape", "sequence", "fabric"):
+    for key in ("split", "design", "shape", "sequence", "topology", "fabric"):
         groups: dict[str, list[Mapping[str, Any]]] = {}
         for row in rows:
             if row[key]:
@@ -206,7 +210,7 @@ Without it (`pip install zarr pcodec`):
 ```python
 import zarr
 
-group = zarr.open_group("samples/{row["id"]}.zarr", mode="r")
+group = zarr.open_group("samples/{row["id"]}.zarr.zip", mode="r")
 positions, faces = group["positions"][...], group["faces"][...]  # float32 {shape}, metres; int32
 print(positions.shape, faces.shape, group.attrs["meta"]["certificate"])
 ```

@@ -21,7 +21,9 @@ from muslin.sim.dataset.jobs import Chain, Plan
 from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.progress import Progress, Tally
 from muslin.sim.dataset.quarantine import Quarantined, quarantine, quarantined_ids, release, state_name
+from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.root import Root, open_root
+from muslin.sim.dataset.schema import PICTURE
 from muslin.sim.dataset.solver import solver_digest
 from muslin.sim.dataset.sources import check_sources
 from muslin.sim.dataset.worker import ChainSimulator, Made, Task, make_chain
@@ -64,6 +66,7 @@ def generate(
     make_scene: Callable[[dict[str, Any]], Any] | None = None,
     again: Collection[str] = (),
     retry: bool = False,
+    picture: bool = False,
 ) -> GenerateReport:
     """Make every planned sample that is not there yet.
 
@@ -80,6 +83,7 @@ def generate(
     again        ids of samples to make again: once nothing stands in the way of that, what is there of them
                  is moved to `failed/`
     retry        try samples in quarantine again
+    picture      draw some of the samples beside the card, too
 
     A sample that fails, or whose worker dies time after time, goes into quarantine (`failed/ID.json`), with
     the rest of its chain; the others go on. Raises InputError for a configuration or a scene that cannot be
@@ -126,6 +130,9 @@ def generate(
             run.over(where, todo)
         root.clean()
         write_index(root, header, run.rows)
+        if picture and (run.made or not root.exists(PICTURE)):
+            _draw(root, run.tally)
+        run.tally.end("finished")
         card = write_card(root, header, read_index(root, header), planned.jobs)
     order = [job.id for job in planned.jobs]
     skipped = {job.id for task in tasks if task not in todo for job in task.wanted}
@@ -147,6 +154,7 @@ class _Run:
     def __init__(self, root: Root, header: Header, rows: Mapping[str, dict[str, Any]], tally: Tally) -> None:
         self.root, self.header, self.tally = root, header, tally
         self.rows = dict(rows)
+        self.made = 0
         self.failed: dict[str, str] = {}
         self.busy = 0.0
 
@@ -185,7 +193,6 @@ class _Run:
                 write_index(self.root, self.header, self.rows)
                 self.tally.end("stopped")
             raise
-        self.tally.end("finished")
 
     def _finished(self, place: int, task: Task, found: Made | Died) -> None:
         wanted = [job.id for job in task.wanted]
@@ -199,6 +206,7 @@ class _Run:
         if found.store:
             raise OSError(found.store)
         self.rows |= {row["id"]: row for row in found.rows}
+        self.made += len(found.rows)
         rest = wanted[len(found.rows) :]
         if found.failed:
             self._fail(task, rest, found.failed, found.reason, found.log)
@@ -212,6 +220,15 @@ class _Run:
         self.failed[sample_id] = reason
         for behind in rest[1:]:
             self.failed[behind] = f"comes after {sample_id} in its chain: {reason}"
+
+
+def _draw(root: Root, tally: Tally) -> None:
+    from muslin.sim.view.overview import overview
+
+    dataset = open_dataset(root)
+    if len(dataset):
+        tally.stage("drawing")
+        root.write(PICTURE, overview(dataset))
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ from typing import Any
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.root import Root
-from muslin.sim.dataset.schema import CARD, FORMAT, HEADER, SAMPLES, SCHEMA_VERSION
+from muslin.sim.dataset.schema import CARD, FORMAT, HEADER, PICTURE, PROGRESS, SAMPLES, SCHEMA_VERSION
 
 
 def canonical(value: Any) -> bytes:
@@ -100,7 +100,7 @@ def prepare_root(root: Root, header: Header) -> Header | None:
     """
     before = read_header(root) if root.exists(HEADER) else None
     if before is None:
-        strangers = [name for name in root.names() if name not in (CARD, SAMPLES)]
+        strangers = [name for name in root.names() if name not in (CARD, PICTURE, PROGRESS, SAMPLES)]
         if strangers:
             raise InputError(
                 f"{root}: not empty ({', '.join(strangers[:3])}…) and no muslin dataset; "

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from muslin.sim.dataset.header import digest
-from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.progress import Status, read_status
+from muslin.sim.dataset.quarantine import quarantined_ids, read_quarantined
+from muslin.sim.dataset.reader import Dataset, open_dataset
 from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.solver import solver_digest
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,10 @@ class DatasetInfo:
     unmeasured                                    {figure: samples whose certificate lacks it}
     seconds                                       computing time, summed over samples
     geometry_sha256                               equal exactly where two datasets hold the same geometry
+    quarantined                                   {id: reason} of samples that were given up
+    solver                                        "as installed", or "another": what is missing cannot be
+                                                  made by what is installed here, and what is there is stale
+    run                                           how far the last run of `generate` was, if that is known
     """
 
     name: str
@@ -49,6 +56,9 @@ class DatasetInfo:
     seconds: float
     versions: dict[str, str]
     geometry_sha256: str
+    quarantined: dict[str, str]
+    solver: str
+    run: Status | None
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -93,7 +103,15 @@ def info(path: str | Path | Root) -> DatasetInfo:
         seconds=sum(row["seconds"] for row in rows),
         versions=dataset.header.versions,
         geometry_sha256=digest({row["id"]: row["geometry_sha256"] for row in rows}),
+        quarantined={i: read_quarantined(dataset.root, i).reason for i in _held(dataset)},
+        solver="as installed" if dataset.header.solver_digest == solver_digest() else "another",
+        run=read_status(dataset.root),
     )
+
+
+def _held(dataset: Dataset) -> list[str]:
+    """Ids in quarantine of samples that are not there, in order."""
+    return sorted(i for i in quarantined_ids(dataset.root) if i not in dataset)
 
 
 def _count(names: Iterable[str]) -> dict[str, int]:

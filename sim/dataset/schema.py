@@ -3,6 +3,7 @@
     ROOT/muslin.json               header: schema version, config, versions, solver digest, splits
     ROOT/index.parquet             one row a sample; a cache of what the samples say, rebuilt when missing
     ROOT/README.md                 card: what the dataset is, for people; written by `generate`
+    ROOT/samples.png               picture of some samples from all over the dataset
     ROOT/progress.json             how far the last run was, for who looks from elsewhere
     ROOT/samples/ID.zarr.zip       one zarr 3 group a sample, in an archive without compression
     ROOT/failed/ID.json            why a sample was given up, and all that is needed to look into it
@@ -34,6 +35,7 @@ HEADER = "muslin.json"
 INDEX = "index.parquet"
 CARD = "README.md"
 PROGRESS = "progress.json"
+PICTURE = "samples.png"
 SAMPLES = "samples"
 PARTIAL = ".partial"
 FAILED = "failed"
