@@ -346,6 +346,22 @@ def workers(
 
 
 @app.command()
+def engine(
+    chains: Annotated[int, typer.Option(min=2, help="An even number, so that both have as many.")] = 4,
+    chain: Annotated[int, typer.Option(min=1, help="Drapes in a chain.")] = 8,
+    edge_length: Annotated[float, typer.Option(help="Of the cloth, metres.")] = 0.02,
+    rounds: Rounds = 3,
+    out: Out = OUT / "engine",
+) -> None:
+    """Wall time of `muslin generate --workers 2` over that of two bare processes."""
+    from benchmarks.engine import measure_overhead
+
+    found = measure_overhead(chains, chain, edge_length, rounds, out, typer.echo)
+    typer.echo(f"engine over bare, {found.samples} drapes: {found.ratio.text(3)}")
+    _write(out / "engine.json", asdict(found))
+
+
+@app.command()
 def memory(
     seconds: Annotated[float, typer.Option(help="Of the walk.")] = 0.5, out: Out = OUT, core: Core = 0
 ) -> None:
