@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.isolated import ONE_THREAD
 from benchmarks.spread import Spread, paired_ratio
 
 MUSLIN_COMMAND = Path(sys.executable).with_name("muslin")
@@ -69,7 +70,7 @@ def measure_overhead(
 
 def _together(commands: Sequence[Sequence[str]], log: Path) -> float:
     """Wall seconds until all commands, begun at once, have ended. RuntimeError if one fails."""
-    alone = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    alone = os.environ | ONE_THREAD
     with log.open("w", encoding="utf-8") as stream:
         begun = time.perf_counter()
         running = [subprocess.Popen(c, env=alone, stdout=stream, stderr=stream) for c in commands]

@@ -28,8 +28,9 @@ from muslin.sim.dataset.solver import solver_digest
 from muslin.sim.dataset.sources import check_sources
 from muslin.sim.dataset.worker import ChainSimulator, Made, Task, make_chain
 
-INDEX_S = 120.0
-"""Between two writings of the index while samples are made."""
+INDEX_S, INDEX_SHARE = 120.0, 0.05
+"""Between two writings of the index while samples are made, at least; and the most of the time that they may
+take."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ class _Run:
             self._follow(engine, order)
 
     def _follow(self, engine: Engine, order: Sequence[Task]) -> None:
-        written = time.monotonic()
+        due = time.monotonic() + INDEX_S
         try:
             for event in engine.run(make_chain, order):
                 if isinstance(event, Done):
@@ -184,15 +185,21 @@ class _Run:
                     self.tally.news(event.place, share, at, len(order[event.place].wanted))
                 else:
                     self.tally.tick()
-                if time.monotonic() - written > INDEX_S:
-                    write_index(self.root, self.header, self.rows)
-                    written = time.monotonic()
+                if time.monotonic() > due:
+                    due = self._write_index()
         except BaseException:
             # However it ends, what was made is listed, so that nobody has to read it all to know.
             with contextlib.suppress(OSError):  # the first error tells more
                 write_index(self.root, self.header, self.rows)
                 self.tally.end("stopped")
             raise
+
+    def _write_index(self) -> float:
+        """Write what is known so far; return when to do it next."""
+        begun = time.monotonic()
+        write_index(self.root, self.header, self.rows)
+        ended = time.monotonic()
+        return ended + max(INDEX_S, (ended - begun) / INDEX_SHARE)
 
     def _finished(self, place: int, task: Task, found: Made | Died) -> None:
         wanted = [job.id for job in task.wanted]
