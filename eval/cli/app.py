@@ -92,7 +92,7 @@ for name, command, summary in (
     ("eval", evaluate, "Score a prediction against the truth."),
     ("bench", bench, "Methods against each other by a protocol."),
     ("report", report, "A dataset as one HTML page."),
-    ("export", export, "Samples as OBJ, PLY, GLB, USD, PC2 or NPZ."),
+    ("export", export, "Samples as files, or datasets in others' layouts."),
     ("pattern", pattern, "A sewing pattern as file, mesh or drawing."),
     ("remesh", remesh, "A draped garment in other triangles."),
     ("render", render, "Pictures and movies."),

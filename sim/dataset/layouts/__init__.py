@@ -1,0 +1,1 @@
+"""Whole datasets in the folders and files that others' programs read."""
