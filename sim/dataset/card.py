@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from muslin.sim.dataset import licences
 from muslin.sim.dataset.header import Header, digest
 from muslin.sim.dataset.jobs import Job
 from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.schema import CARD, PICTURE
-from muslin.sim.dataset.toml_text import toml_text
 
 MARK = "<!-- Dataset card, written anew by `muslin generate`. Take this line away to keep changes. -->"
 MOST_NAMES = 12
@@ -221,7 +221,7 @@ print(positions.shape, faces.shape, group.attrs["meta"]["certificate"])
 def _making(header: Header, rows: Sequence[Mapping[str, Any]]) -> str:
     versions = [[name, version] for name, version in header.versions.items()]
     geometry = digest({row["id"]: row["geometry_sha256"] for row in rows})
-    config = toml_text(_without_folders(header.config))
+    config = tomli_w.dumps(_given(_without_folders(header.config)))
     return f"""{_table(("", "version"), versions)}
 
 | | sha256 |
@@ -239,6 +239,14 @@ def _making(header: Header, rows: Sequence[Mapping[str, Any]]) -> str:
 Of files named by absolute paths only the names are shown; `muslin.json` has the config as it was given.
 
 </details>"""
+
+
+def _given(value: Any) -> Any:
+    """Without None, which TOML does not know, and without tables and lists that hold nothing."""
+    if isinstance(value, Mapping):
+        inner = {key: _given(entry) for key, entry in value.items() if entry is not None}
+        return {key: entry for key, entry in inner.items() if entry not in ({}, [])}
+    return [_given(entry) for entry in value] if isinstance(value, list) else value
 
 
 def _without_folders(value: Any) -> Any:
