@@ -210,7 +210,8 @@ Without it (`pip install zarr pcodec`):
 ```python
 import zarr
 
-group = zarr.open_group("samples/{row["id"]}.zarr.zip", mode="r")
+packed = zarr.storage.ZipStore("samples/{row["id"]}.zarr.zip", mode="r")
+group = zarr.open_group(packed, mode="r")
 positions, faces = group["positions"][...], group["faces"][...]  # float32 {shape}, metres; int32
 print(positions.shape, faces.shape, group.attrs["meta"]["certificate"])
 ```

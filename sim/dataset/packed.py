@@ -1,7 +1,7 @@
 """A zarr group as one file: a zip archive without compression, of which single chunks are read.
 
 One file a sample keeps datasets within the numbers of files that shared file systems allow, makes a commit
-one step, and one request of a store. zarr reads it as it is (`zarr.open_group("ID.zarr.zip")`). Here it is
+one step, and one request of a store. zarr reads it as it is, by `zarr.storage.ZipStore`. Here it is
 read through a `Root`, a chunk by one access at its place, of a folder and of a store alike.
 """
 
