@@ -159,7 +159,7 @@ class WornGarment:
         steps = int(np.ceil(np.linalg.norm(far, axis=1).max() / MORPH_MOVE))
         begin, end = quaternion_from_axis_angle(self.theta), quaternion_from_axis_angle(theta)
         for k in range(1, steps + 1):
-            share = np.full((1, 1), k / steps)
+            share = np.array(k / steps)
             between = axis_angle_from_quaternion(slerp(begin, end, share)) if k < steps else theta
             self.follow(between, translation, MORPH_DT, inertia=False)
             if tick is not None:
