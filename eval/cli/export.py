@@ -11,7 +11,9 @@ from muslin.garments.errors import InputError
 
 
 def export(
-    source: Annotated[Path, typer.Argument(metavar="DIR", help="A dataset, or a mesh file.")],
+    source: Annotated[
+        str, typer.Argument(metavar="DIR", help="A dataset, in a folder or at a URL, or a mesh file.")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
     file_format: Annotated[
         str | None,
@@ -56,7 +58,8 @@ def export(
     from muslin.sim.dataset.parts import read_mesh
     from muslin.sim.dataset.selection import select
 
-    if layout is not None and (file_format is not None or source.is_file()):
+    file = Path(source)
+    if layout is not None and (file_format is not None or file.is_file()):
         raise InputError(
             "--layout is for whole datasets, and says the formats of files; give it without --format"
         )
@@ -76,10 +79,10 @@ def export(
         typer.echo(f"{out}: {len(done.written)} samples written, {len(done.kept)} were there")
         return
     file_format = file_format or "obj"
-    if source.is_file():
-        mesh = read_mesh(source)
-        check_mesh(mesh.positions, mesh.faces, str(source))
-        files = export_parts(source.stem, [mesh], None, out, file_format)
+    if file.is_file():
+        mesh = read_mesh(file)
+        check_mesh(mesh.positions, mesh.faces, source)
+        files = export_parts(file.stem, [mesh], None, out, file_format)
     else:
         chosen = select(source, split, conditions, samples or None)
         with progress_bar("export") as update:
