@@ -12,8 +12,8 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 from muslin.garments.errors import InputError
 from muslin.sim.material import fabric_names
 from muslin.sim.motion_table import MotionTable
+from muslin.sim.remesh.distortion import MAX_DISTORTION
 from muslin.sim.remesh.settings import RemeshTable
-from muslin.sim.remesh.topology import MAX_DISTORTION
 from muslin.sim.table_errors import explain
 from muslin.sim.tables import ZERO, Finite, Positive, RepeatTable, Table, Vector
 from muslin.sim.toml_values import read_values

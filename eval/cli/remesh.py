@@ -10,6 +10,7 @@ import typer
 
 from muslin.eval.cli.options import Force, SampleId, check_new
 from muslin.garments.errors import InputError
+from muslin.sim.remesh.distortion import MAX_DISTORTION
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from muslin.sim.remesh.settings import RemeshSettings
     from muslin.sim.remesh.topology import Remeshed
 
-MAX_DISTORTION = 2.5  # that of `muslin.sim.remesh.topology`, which loads Warp
 MOST_TOPOLOGIES = 10_000
 
 

@@ -47,7 +47,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.presets import with_preset
 from muslin.sim.motion_table import MotionSource, WalkTable, WarpTable
-from muslin.sim.remesh.topology import MAX_DISTORTION
+from muslin.sim.remesh.distortion import MAX_DISTORTION
 from muslin.sim.scene import ExpectTable
 from muslin.sim.toml_values import read_values, set_value
 

@@ -11,6 +11,9 @@ from muslin.sim.remesh.metric import EQUILATERAL, area_density, quadratic_form
 
 Array = NDArray[np.float64]
 
+MAX_DISTORTION = 2.5
+"""Allowed where nothing else is said."""
+
 
 def distortion(mesh: GarmentMesh, metric: Array) -> Array:
     """(F,) normalised aspect of the panel triangles in a metric (P, 2, 2) at panel vertices; 1: equilateral,

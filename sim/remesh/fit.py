@@ -12,8 +12,9 @@ from scipy.sparse.linalg import splu
 
 from muslin.garments.locate import barycentric
 from muslin.garments.mesh import GarmentMesh
+from muslin.sim.remesh.distortion import MAX_DISTORTION
 from muslin.sim.remesh.panel_space import PanelSpace
-from muslin.sim.remesh.topology import MAX_DISTORTION, Remeshed, remesh
+from muslin.sim.remesh.topology import Remeshed, remesh
 from muslin.sim.remesh.untangle import untangle
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
-from muslin.sim.remesh.distortion import distortion, forced, least_quality
+from muslin.sim.remesh.distortion import MAX_DISTORTION, distortion, forced, least_quality
 from muslin.sim.remesh.field import Field
 from muslin.sim.remesh.fill import Filling, fill
 from muslin.sim.remesh.metric import area_density, triangles_asked, uniform
@@ -21,7 +21,6 @@ from muslin.sim.remesh.rings import rings
 
 JITTER = 0.2  # of the edge length: how far boundary vertices move along their curve at random
 
-MAX_DISTORTION = 2.5
 MENDED = 2.2
 """Distortion above which triangles are mended where more is allowed: uniform targets reach it
 nearly everywhere (`docs/remeshing.md`)."""

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from muslin.eval.cli import remesh as command
 from muslin.garments.designs.tee import TEE
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.obj import read_garment, write_garment
@@ -17,7 +16,6 @@ from muslin.sim.body import load_body
 from muslin.sim.dataset.intersections import find_crossings
 from muslin.sim.dataset.reader import write_dataset
 from muslin.sim.dataset.sample import BodyTrack
-from muslin.sim.remesh.topology import MAX_DISTORTION
 from tests.eval.cli.commands import muslin, refused
 
 
@@ -150,7 +148,3 @@ def test_what_is_wrong_is_said_in_a_line(dataset, panels, tmp_path):
     (tmp_path / "out.obj").write_text("mine")
     refuses(panels, *area, *out, says="is there already")
     assert (tmp_path / "out.obj").read_text() == "mine"
-
-
-def test_the_default_distortion_is_that_of_python():
-    assert command.MAX_DISTORTION == MAX_DISTORTION
