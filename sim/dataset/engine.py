@@ -24,7 +24,7 @@ from typing import Any, Generic, TypeVar
 
 import dask
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, WorkerPlugin, get_worker
-from distributed.client import FutureCancelledError
+from distributed.client import ClosedClientError, FutureCancelledError
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.processes import leave_interrupts_to_parent, usable_cores
@@ -34,17 +34,23 @@ Found = TypeVar("Found")
 
 RETRIES = 3
 """How often a task is given to another worker after one died over it."""
-LOST_S = 60.0
-"""How long a scheduler may be out of reach."""
+LOST_S = 30.0
+"""How long a scheduler may be out of reach when a run starts."""
 _AHEAD, _LEAST_AHEAD = 2, 8
 """Tasks handed over for every worker, and at least."""
 _LOG_LINES = 200
+_RESULT_S = 10.0
+"""In which the result of a finished task comes, unless its worker has died since."""
 
 _CONFIG = {
-    # A worker gets its next task when it has done the last: what waits at one that dies is suspected too.
+    # A worker gets its next task when it has done the last.
     "distributed.scheduler.worker-saturation": 1.0,
     # A busy worker is not dead, and a clock that jumps must not make it so; nannies see processes die.
     "distributed.scheduler.worker-ttl": None,
+    # Results are small: only ending helps a worker that is full. One that pauses would never go on.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500ms",
     # glibc's own threshold: dask's returns memory after every array, which costs time and saves none here.
@@ -137,21 +143,32 @@ class Engine:
                 if isinstance(event, News):
                     yield event
                     continue
-                yield Done(begun.pop(event), self._result(event))
+                found = self._result(event)
+                if found is None:
+                    event.add_done_callback(events.put)
+                    continue
+                yield Done(begun.pop(event), found)
                 if time.monotonic() - looked > 10.0:
                     ahead, looked = self._ahead(), time.monotonic()
         finally:
-            with contextlib.suppress(OSError, RuntimeError):  # of a scheduler that is gone
+            with contextlib.suppress(OSError, RuntimeError, ClosedClientError):  # of a scheduler that is gone
                 self.client.cancel(list(begun))
                 self.client.unsubscribe_topic(topic)
 
     def _submit(self, function: Any, place: int, task: Any, topic: str, events: Any) -> Future:
-        future = self.client.submit(_run, function, task, place, topic, pure=False, key=f"{topic}-{place}")
+        # As a producer of data it waits at the scheduler. What waits at a worker is suspected when that dies.
+        more: dict[str, Any] = {"_data_producer": True}
+        key = f"{topic}-{place}"
+        future = self.client.submit(_run, function, task, place, topic, pure=False, key=key, **more)
         future.add_done_callback(events.put)
         return future
 
     def _ahead(self) -> int:
-        return max(_LEAST_AHEAD, _AHEAD * sum(self.client.nthreads().values()))
+        try:
+            threads = self.client.nthreads()
+        except (OSError, ClosedClientError) as error:
+            raise _lost(str(error)) from error
+        return max(_LEAST_AHEAD, _AHEAD * sum(threads.values()))
 
     def _check(self) -> None:
         """Raise InputError if the scheduler has been out of reach for too long."""
@@ -159,16 +176,21 @@ class Engine:
             raise _lost(str(self.client.scheduler.address if self.client.scheduler else "the scheduler"))
 
     def _result(self, future: Future) -> Any:
+        """What came of a task; None if it went down with its worker, and is being made again."""
         try:
-            return future.result(timeout=LOST_S)
+            found = future.result(timeout=_RESULT_S)
         except KilledWorker as error:
             deaths = error.allowed_failures + 1
             reason = f"the worker process died, {deaths} times: most often because memory ran out"
-            return Died(reason, tuple(self._log))
-        except (CancelledError, FutureCancelledError, OSError, TimeoutError) as error:
+            found = Died(reason, tuple(self._log))
+        except (CancelledError, FutureCancelledError) as error:
             raise _lost(str(error)) from error
-        finally:
-            future.release()
+        except (OSError, TimeoutError):
+            if future.status == "error":  # of the task itself
+                raise
+            return None
+        future.release()
+        return found
 
 
 @contextmanager
@@ -181,7 +203,7 @@ def open_engine(cluster: Cluster) -> Iterator[Engine]:
 @contextmanager
 def _joined(address: str) -> Iterator[Engine]:
     try:
-        client = Client(address, timeout=LOST_S / 2.0)
+        client = Client(address, timeout=LOST_S)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
             f"--scheduler {address}: no dask scheduler answers there ({error}); start one with "
@@ -224,8 +246,8 @@ def _kill(local: LocalCluster) -> None:
 
 def _lost(reason: str) -> InputError:
     return InputError(
-        f"the dask scheduler is lost ({reason}); start it again, and then this command: what was finished is "
-        "kept"
+        f"the dask scheduler is lost ({' '.join(reason.split())}); start it again, and then this command: what "
+        "was finished is kept"
     )
 
 
@@ -255,11 +277,21 @@ def _heard() -> Iterator[deque[str]]:
         logger.removeHandler(handler)
 
 
+class _Unwanted(BaseException):
+    """Ends a task from within; tasks that catch their exceptions let it pass."""
+
+
 def _run(function: Any, task: Any, place: int, topic: str) -> Any:
-    """In a worker: the task, with a way to tell news at most every half second."""
+    """In a worker: the task, with a way to tell news at most every half second.
+
+    It ends there if nobody waits for it any more: the process that sent it was killed, say.
+    """
     worker, lock, last = get_worker(), threading.Lock(), [0.0]
+    state = worker.state.tasks[worker.get_current_task()]
 
     def tell(said: Any) -> None:
+        if state.state == "cancelled":
+            raise _Unwanted
         with lock:
             now = time.monotonic()
             if now - last[0] >= 0.5:

@@ -16,7 +16,7 @@ from muslin.sim.dataset.card import write_card
 from muslin.sim.dataset.config import DatasetConfig
 from muslin.sim.dataset.engine import Cluster, Died, Done, Engine, News, open_engine
 from muslin.sim.dataset.header import Header, prepare_root
-from muslin.sim.dataset.index import read_index, stored_rows, write_index
+from muslin.sim.dataset.index import read_index, read_row, stored_rows, write_index
 from muslin.sim.dataset.jobs import Chain, Plan
 from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.progress import Progress, Tally
@@ -33,12 +33,16 @@ INDEX_S, INDEX_SHARE = 120.0, 0.05
 take."""
 
 
+BEHIND = "comes after "
+"""Begins the reason of a sample that could not be made because one before it in its chain could not."""
+
+
 @dataclass(frozen=True)
 class GenerateReport:
     """What `generate` did.
 
     made, kept   ids in plan order; `kept` were there already
-    failed       {id: reason} of what could not be made in this run
+    failed       {id: reason} of what could not be made in this run, `BEHIND` others in their chains included
     held         ids in quarantine since an earlier run, and those behind them in their chains: not tried
     aside        {id: place} of what was set aside to be made again
     card         False if README.md is not the dataset's card but somebody's own, and was left as it is
@@ -205,6 +209,7 @@ class _Run:
         wanted = [job.id for job in task.wanted]
         if isinstance(found, Died):
             rest = [i for i in wanted if not self.root.exists(store.sample_name(i))]
+            self.rows |= {i: read_row(self.root, i) for i in wanted if i not in rest}
             if rest:
                 self._fail(task, rest, rest[0], found.reason, found.log)
             self.tally.finished(place, len(wanted) - len(rest), len(rest))
@@ -226,7 +231,7 @@ class _Run:
         quarantine(self.root, _entry(self.root, task.chain, sample_id, reason, log, task.versions))
         self.failed[sample_id] = reason
         for behind in rest[1:]:
-            self.failed[behind] = f"comes after {sample_id} in its chain: {reason}"
+            self.failed[behind] = f"{BEHIND}{sample_id} in its chain"
 
 
 def _draw(root: Root, tally: Tally) -> None:

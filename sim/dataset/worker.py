@@ -93,7 +93,11 @@ def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
     except Exception as error:  # reported for the samples it cost; the other chains are not its business
         reason = f"{type(error).__name__}: {error}"
         if isinstance(error, SimulationError) and error.state is not None:
-            reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
+            try:
+                reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
+            except OSError as unwritable:
+                why = f"{type(unwritable).__name__}: {unwritable}"
+                return Made(rows, store=why, seconds=time.perf_counter() - begun)
         log = tuple(traceback.format_exc().splitlines())
         return Made(rows, left[0].id, reason, log, seconds=time.perf_counter() - begun)
     return Made(rows, seconds=time.perf_counter() - begun)
