@@ -29,6 +29,9 @@ Preset = Annotated[
     typer.Option("--preset", metavar="NAME", help="A variant that the file holds: [presets.NAME]."),
 ]
 
+MOST_TOLD = 20
+"""Failures told one by one."""
+
 
 def generate(
     config: Annotated[Path, typer.Argument(metavar="DATASET.toml", help="What to make.")],
@@ -89,8 +92,15 @@ def generate(
 
 
 def _tell_failures(out: str, result: GenerateReport) -> None:
-    for sample_id, reason in result.failed.items():
+    from muslin.sim.dataset.generate import BEHIND
+
+    first = [(i, reason) for i, reason in result.failed.items() if not reason.startswith(BEHIND)]
+    for sample_id, reason in first[:MOST_TOLD]:
         typer.echo(f"  {sample_id}: {reason}", err=True)
+    if len(first) > MOST_TOLD:
+        typer.echo(f"  and {len(first) - MOST_TOLD} more", err=True)
+    if behind := len(result.failed) - len(first):
+        typer.echo(f"  and {behind} that come after one of these in a chain", err=True)
     if result.failed:
         typer.echo(f"muslin: {len(result.failed)} samples could not be made; see {out}/failed", err=True)
     if result.held:

@@ -169,7 +169,7 @@ def _sources(rows: Sequence[Mapping[str, Any]], scenes: Sequence[Mapping[str, An
     layers = [layer for scene in scenes for layer in scene.get("layers") or ()]
     garments = [scene.get("garment") or {} for scene in scenes] + layers
     bodies = _names(row["body"] for row in rows)
-    motions = _names((scene.get("motion") or {}).get("clip") for scene in scenes)
+    motions = _names(clip for scene in scenes for clip in _clips(scene.get("motion") or {}))
     fabrics = _names([row["fabric"] for row in rows] + [layer.get("fabric") for layer in layers])
     patterns = _names(garment.get("pattern") or garment.get("mesh") for garment in garments)
     lines = [["body", _file_name(name), *licences.body_source(name)] for name in bodies]
@@ -184,6 +184,12 @@ def _sources(rows: Sequence[Mapping[str, Any]], scenes: Sequence[Mapping[str, An
         + "; `NOTICE` of muslin (Apache-2.0) has them in full.\n\n"
         + _table(("", "name", "source", "terms"), lines)
     )
+
+
+def _clips(motion: Mapping[str, Any]) -> list[Any]:
+    """The clips that a motion is made of."""
+    walk = motion.get("random_walk") or {}
+    return [motion.get("clip"), *motion.get("into", ()), *walk.get("among", ())]
 
 
 def _names(given: Iterable[Any]) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from muslin.garments import catalogue
 from muslin.garments.pattern_file import read_pattern
+from muslin.garments.template import resolution_of
 from muslin.sim.body.load import load_body
 from muslin.sim.fabric_file import is_fabric_file, read_fabric
 from muslin.sim.motion_table import read_motion
@@ -51,3 +52,5 @@ def _check_garment(garment: GarmentTable) -> None:
     design = catalogue.get(garment.design)
     preset = {} if garment.preset is None else design.preset(garment.preset)
     design.complete(preset | garment.parameters)
+    if garment.template is not None:
+        resolution_of(garment.template)
