@@ -62,8 +62,11 @@ class _Opened:
 def _open(root: Root, sample_id: str, stamp: Hashable) -> _Opened:
     group, place = store.open_sample(root, sample_id), store.sample_place(root, sample_id)
     meta, checksums = store.meta_of(group, place)
-    frames, starts = int(meta["frames"]), None
-    shape: tuple[int, ...] = (frames, meta["vertices"], 3)
+    try:
+        frames, starts = int(meta["frames"]), None
+        shape: tuple[int, ...] = (frames, int(meta["vertices"]), 3)
+    except store.UNREADABLE as error:
+        raise InputError(f"{place}/zarr.json: not the attributes of a sample; {store.REMEDY}") from error
     if "frame_topology" in checksums:
         sizes = store.read_array(root, sample_id, "topology_sizes")[:, VERTICES]
         counts = sizes[store.read_array(root, sample_id, "frame_topology")]

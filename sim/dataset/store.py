@@ -30,7 +30,10 @@ from muslin.sim.dataset.schema import (
     ArraySpec,
 )
 
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, RuntimeError)
+UNREADABLE = (
+    *(OSError, ValueError, LookupError, TypeError),
+    *(RuntimeError, ArithmeticError, AttributeError),
+)
 """What zarr and its codecs raise over damaged files."""
 REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
 
@@ -117,12 +120,17 @@ def meta_of(group: zarr.Group, place: str) -> tuple[dict[str, Any], dict[str, st
     meta, checksums = attributes.get("meta"), attributes.get("sha256")
     if not isinstance(meta, dict) or not isinstance(checksums, dict):
         raise InputError(f"{place}/zarr.json: not the attributes of a sample; {REMEDY}")
-    if meta.get("schema_version", 0) > REMESHED_SAMPLE_VERSION:
+    found = meta.get("schema_version")
+    if isinstance(found, int) and found > REMESHED_SAMPLE_VERSION:
         raise InputError(
-            f"{place}: schema_version = {meta['schema_version']} is newer than {REMESHED_SAMPLE_VERSION}, "
+            f"{place}: schema_version = {found} is newer than {REMESHED_SAMPLE_VERSION}, "
             "the newest that this program reads; update muslin (pip install -U muslin)"
         )
-    if attributes.get("meta_sha256") != digest(meta):
+    try:
+        matches = attributes.get("meta_sha256") == digest(meta)
+    except ValueError:  # NaN, which was never written
+        matches = False
+    if not matches:
         raise InputError(f"{place}/zarr.json: attributes do not match their checksum; {REMEDY}")
     return meta, checksums
 
@@ -133,14 +141,16 @@ def read_sample(root: Root, sample_id: str) -> Sample:
     meta, checksums = meta_of(group, place)
     arrays = {name: _read_array(group, place, name, checksum) for name, checksum in checksums.items()}
     try:
-        sample = _assemble(meta, arrays)
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{place}: the sample lacks {error}; {REMEDY}") from error
+        sample = _assemble(meta, arrays).validate()
     except InputError as error:
         raise InputError(f"{place}: {error}; {REMEDY}") from error
+    except KeyError as error:
+        raise InputError(f"{place}: the sample lacks {error}; {REMEDY}") from error
+    except UNREADABLE as error:
+        raise InputError(f"{place}: not a sample ({error}); {REMEDY}") from error
     if sample.id != sample_id:
         raise InputError(f"{place}: holds sample {sample.id!r}; rename the file to {sample.id}{SUFFIX}")
-    return sample.validate()
+    return sample
 
 
 def read_array(root: Root, sample_id: str, name: str) -> np.ndarray:
