@@ -246,8 +246,8 @@ def _kill(local: LocalCluster) -> None:
 
 def _lost(reason: str) -> InputError:
     return InputError(
-        f"the dask scheduler is lost ({' '.join(reason.split())}); start it again, and then this command: what "
-        "was finished is kept"
+        f"the dask scheduler is lost ({' '.join(reason.split())}); start it again, and then this command: "
+        "what was finished is kept"
     )
 
 
