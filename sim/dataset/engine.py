@@ -36,6 +36,8 @@ RETRIES = 3
 """How often a task is given to another worker after one died over it."""
 LOST_S = 30.0
 """How long a scheduler may be out of reach when a run starts."""
+NEWS_S, MOST_NEWS = 0.5, 20.0
+"""Seconds between two news of one worker, at least; and news of all workers a second, at most."""
 _AHEAD, _LEAST_AHEAD = 2, 8
 """Tasks handed over for every worker, and at least."""
 _LOG_LINES = 200
@@ -112,6 +114,7 @@ class Engine:
 
     client: Client
     dashboard: str = ""
+    _every: float = NEWS_S
     _log: deque[str] = field(default_factory=lambda: deque(maxlen=_LOG_LINES))
 
     def run(
@@ -159,7 +162,8 @@ class Engine:
         # As a producer of data it waits at the scheduler. What waits at a worker is suspected when that dies.
         more: dict[str, Any] = {"_data_producer": True}
         key = f"{topic}-{place}"
-        future = self.client.submit(_run, function, task, place, topic, pure=False, key=key, **more)
+        call = (_run, function, task, place, topic, self._every)
+        future = self.client.submit(*call, pure=False, key=key, **more)
         future.add_done_callback(events.put)
         return future
 
@@ -168,7 +172,9 @@ class Engine:
             threads = self.client.nthreads()
         except (OSError, ClosedClientError) as error:
             raise _lost(str(error)) from error
-        return max(_LEAST_AHEAD, _AHEAD * sum(threads.values()))
+        count = sum(threads.values())
+        self._every = max(NEWS_S, count / MOST_NEWS)
+        return max(_LEAST_AHEAD, _AHEAD * count)
 
     def _check(self) -> None:
         """Raise InputError if the scheduler has been out of reach for too long."""
@@ -281,8 +287,8 @@ class _Unwanted(BaseException):
     """Ends a task from within; tasks that catch their exceptions let it pass."""
 
 
-def _run(function: Any, task: Any, place: int, topic: str) -> Any:
-    """In a worker: the task, with a way to tell news at most every half second.
+def _run(function: Any, task: Any, place: int, topic: str, every: float) -> Any:
+    """In a worker: the task, with a way to tell news, of which one in `every` seconds is sent.
 
     It ends there if nobody waits for it any more: the process that sent it was killed, say.
     """
@@ -294,7 +300,7 @@ def _run(function: Any, task: Any, place: int, topic: str) -> Any:
             raise _Unwanted
         with lock:
             now = time.monotonic()
-            if now - last[0] >= 0.5:
+            if now - last[0] >= every:
                 last[0] = now
                 worker.log_event(topic, [place, said])
 
