@@ -33,7 +33,9 @@ class LocalRoot(Root):
         except FileNotFoundError:
             return []
         except NotADirectoryError as error:
-            raise InputError(f"{self.path / folder}: is a file; give a folder for the dataset") from error
+            raise InputError(
+                f"{self.path / folder}: is a file, or would lie in one; choose another place"
+            ) from error
 
     def size(self, name: str) -> int:
         return (self.path / name).stat().st_size

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from unpacked import entries_of
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
@@ -137,17 +138,18 @@ def simulate(
 
 
 def files_of(root: Path) -> dict[str, bytes]:
-    """Every file of a dataset's samples but the seconds that they took."""
+    """{sample/entry: bytes} of every sample of a dataset, in the order of the file, but the seconds that it
+    took."""
     files = {}
-    for file in sorted((root / "samples").rglob("*")):
-        if file.is_file():
-            data = file.read_bytes()
-            if file.parent.suffix == ".zarr":
+    for file in sorted((root / "samples").iterdir()):
+        for name, content in entries_of(file).items():
+            data = content
+            if name == "zarr.json":
                 values = json.loads(data)
                 values["attributes"]["meta"]["certificate"].pop("seconds")
                 values["attributes"].pop("meta_sha256")
                 data = json.dumps(values).encode()
-            files[str(file.relative_to(root))] = data
+            files[f"{file.name}/{name}"] = data
     return files
 
 

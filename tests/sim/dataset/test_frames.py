@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zarr
 from remeshed_producer import FRAME_TOPOLOGY, remeshed
 from sheet_producer import make_sample
+from unpacked import chunk_of, replace_file, unpacked
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
-from muslin.sim.dataset.codecs import checks_chunks
 from muslin.sim.dataset.reader import Dataset, open_dataset, write_dataset
 
 FRAMES = 700
@@ -28,9 +27,14 @@ def dataset(tmp_path: Path) -> Dataset:
     )
 
 
-def shard(dataset: Dataset, sample_id: str) -> Path:
-    folder = store.sample_path(dataset.root, sample_id) / "positions"
-    return next(p for p in folder.rglob("*") if p.is_file() and p.name != "zarr.json")
+@pytest.fixture
+def still(tmp_path: Path) -> Path:
+    return store.sample_file(tmp_path / "data", "still")
+
+
+@pytest.fixture
+def wave(tmp_path: Path) -> Path:
+    return store.sample_file(tmp_path / "data", "wave")
 
 
 def test_frames_are_those_of_the_whole_sample(dataset: Dataset) -> None:
@@ -58,27 +62,36 @@ def test_what_is_not_there_is_named(dataset: Dataset) -> None:
 
 
 @pytest.mark.parametrize("opened_before", [False, True])
-def test_any_flipped_bit_is_found_by_a_frame_that_needs_it(dataset: Dataset, opened_before: bool) -> None:
-    """A bit of every seventh byte of the shard is flipped in turn, and the frame refused each time."""
-    file = shard(dataset, "still")
-    whole, truth = file.read_bytes(), dataset["still"].positions[0]
+def test_any_flipped_bit_is_found_by_a_frame_that_needs_it(
+    dataset: Dataset, still: Path, opened_before: bool
+) -> None:
+    """A bit of every seventh byte of the shard is flipped in turn, and the frame refused each time.
+
+    The archive is packed anew, so that its own checksums tell nothing.
+    """
+    file, truth = still.read_bytes(), dataset["still"].positions[0]
     if opened_before:
         dataset.frame("still", 0)
+    with unpacked(still) as folder:
+        whole = chunk_of(folder, "positions").read_bytes()
     for place in range(0, len(whole), 7):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << (place % 8)
-        file.write_bytes(damaged)
-        with pytest.raises(InputError, match=r"still\.zarr/positions: .*restore"):
+        with unpacked(still) as folder:
+            chunk_of(folder, "positions").write_bytes(damaged)
+        with pytest.raises(InputError, match=r"still\.zarr\.zip/positions: .*restore"):
             dataset.frame("still", 0)
-    file.write_bytes(whole)
+        replace_file(still, file)
     np.testing.assert_array_equal(dataset.frame("still", 0), truth)
 
 
-def test_damage_to_one_chunk_leaves_the_frames_of_others_readable(dataset: Dataset) -> None:
-    truth, file = dataset["wave"].positions, shard(dataset, "wave")
-    damaged = bytearray(file.read_bytes())
-    damaged[20] ^= 0x10  # of the first chunk, or the last, as zarr orders them
-    file.write_bytes(damaged)
+def test_damage_to_one_chunk_leaves_the_frames_of_others_readable(dataset: Dataset, wave: Path) -> None:
+    truth = dataset["wave"].positions
+    with unpacked(wave) as folder:
+        chunk = chunk_of(folder, "positions")
+        damaged = bytearray(chunk.read_bytes())
+        damaged[20] ^= 0x10  # of the first chunk, or the last, as zarr orders them
+        chunk.write_bytes(damaged)
     refused = 0
     for frame in (0, 350, FRAMES - 1):
         try:
@@ -90,8 +103,9 @@ def test_damage_to_one_chunk_leaves_the_frames_of_others_readable(dataset: Datas
     assert refused == 1
 
 
-def test_a_missing_shard_is_no_frame_of_zeros(dataset: Dataset) -> None:
-    shard(dataset, "wave").unlink()
+def test_a_missing_shard_is_no_frame_of_zeros(dataset: Dataset, wave: Path) -> None:
+    with unpacked(wave) as folder:
+        chunk_of(folder, "positions").unlink()
     with pytest.raises(InputError, match="part of frame 3 is missing"):
         dataset.frame("wave", 3)
 
@@ -104,44 +118,21 @@ def test_flat_cloth_at_zero_is_stored(tmp_path: Path) -> None:
     np.testing.assert_array_equal(made.frame("flat", 0), sample.positions[0])
 
 
-def test_an_array_of_other_shape_is_refused(dataset: Dataset) -> None:
-    file = store.sample_path(dataset.root, "wave") / "positions" / "zarr.json"
-    file.write_text(file.read_text().replace(f"{FRAMES},", f"{FRAMES - 1},", 1))
+def test_an_array_of_other_shape_is_refused(dataset: Dataset, wave: Path) -> None:
+    with unpacked(wave) as folder:
+        file = folder / "positions" / "zarr.json"
+        file.write_text(file.read_text().replace(f"{FRAMES},", f"{FRAMES - 1},", 1))
     with pytest.raises(InputError, match=rf"{FRAMES - 1}, 81, 3.*where.*{FRAMES}, 81"):
         dataset.frame("wave", 0)
 
 
-def test_a_sample_that_replaced_another_is_read_anew(dataset: Dataset, tmp_path: Path) -> None:
+def test_a_sample_that_replaced_another_is_read_anew(dataset: Dataset, still: Path, tmp_path: Path) -> None:
     before = dataset.frame("still", 0)
     other = write_dataset(tmp_path / "other", [make_sample("still", clearance=0.3)])
-    place = store.sample_path(dataset.root, "still")
-    place.rename(tmp_path / "aside")
-    store.sample_path(other.root, "still").rename(place)
+    assert len(other) == 1
+    still.rename(tmp_path / "aside")
+    store.sample_file(tmp_path / "other", "still").rename(still)
     assert not np.array_equal(dataset.frame("still", 0), before)
-
-
-def _store_without_checksums(dataset: Dataset, sample_id: str) -> None:
-    """As the versions before stored positions: Blosc, no checksum of chunks."""
-    positions = dataset[sample_id].positions
-    group = zarr.open_group(zarr.storage.LocalStore(store.sample_path(dataset.root, sample_id)), mode="r+")
-    group.create_array("positions", data=positions, chunks=(200, 81, 3), overwrite=True)
-
-
-def test_older_samples_are_read_whole_and_checked_by_sha256(dataset: Dataset) -> None:
-    truth = dataset["wave"].positions
-    _store_without_checksums(dataset, "wave")
-    path = store.sample_path(dataset.root, "wave")
-    assert not checks_chunks(zarr.open_array(zarr.storage.LocalStore(path / "positions"), mode="r"))
-    np.testing.assert_array_equal(dataset.frame("wave", 300), truth[300])
-    np.testing.assert_array_equal(dataset["wave"].positions, truth)
-
-
-def test_a_damaged_older_sample_is_refused(dataset: Dataset) -> None:
-    _store_without_checksums(dataset, "wave")
-    group = zarr.open_group(zarr.storage.LocalStore(store.sample_path(dataset.root, "wave")), mode="r+")
-    group["positions"][5, 3, 1] = 0.25  # type: ignore[index]
-    with pytest.raises(InputError, match="do not match their sha256"):
-        dataset.frame("wave", 300)
 
 
 def test_one_frame_costs_less_than_all(dataset: Dataset) -> None:

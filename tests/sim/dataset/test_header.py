@@ -11,6 +11,8 @@ import pytest
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.header import Header, describe_difference, digest, prepare_root, read_header
+from muslin.sim.dataset.local_root import LocalRoot
+from muslin.sim.dataset.schema import PARTIAL
 
 HEADER = Header(config={"seed": 0, "scene": {"fabric": "denim"}}, splits={"a": "train", "b": "test"})
 
@@ -20,17 +22,17 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_header_round_trip(tmp_path: Path) -> None:
-    prepare_root(tmp_path, HEADER)
-    HEADER.write(tmp_path)
-    assert read_header(tmp_path) == HEADER
-    assert list(read_header(tmp_path).splits) == ["a", "b"]
+    prepare_root(LocalRoot(tmp_path), HEADER)
+    HEADER.write(LocalRoot(tmp_path))
+    assert read_header(LocalRoot(tmp_path)) == HEADER
+    assert list(read_header(LocalRoot(tmp_path)).splits) == ["a", "b"]
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("chapter 1")
     before = contents(tmp_path)
     with pytest.raises(InputError, match=r"not empty \(thesis\.tex.*empty or new folder"):
-        prepare_root(tmp_path, HEADER)
+        prepare_root(LocalRoot(tmp_path), HEADER)
     assert contents(tmp_path) == before
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -38,39 +40,39 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path: Path) -> None:
     file = tmp_path / "data"
     file.write_text("mine")
-    with pytest.raises(InputError, match="is a file"):
-        prepare_root(file, HEADER)
+    with pytest.raises(InputError, match="data: is a file"):
+        prepare_root(LocalRoot(file), HEADER)
     assert file.read_text() == "mine"
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(InputError, match=r"file/data/samples: cannot be made .* choose another place"):
-        prepare_root(tmp_path / "file" / "data", Header(config={}, splits={}))
+    with pytest.raises(InputError, match="file/data: is a file, or would lie in one; choose another place"):
+        prepare_root(LocalRoot(tmp_path / "file" / "data"), Header(config={}, splits={}))
     assert (tmp_path / "file").read_text() == "mine"
 
 
 def test_a_folder_of_a_run_killed_before_its_header_is_taken_up(tmp_path: Path) -> None:
-    prepare_root(tmp_path, HEADER)
-    (tmp_path / ".muslin.json.77.tmp").write_text("{")
-    assert prepare_root(tmp_path, HEADER) is None
+    prepare_root(LocalRoot(tmp_path), HEADER)
+    (tmp_path / PARTIAL / "muslin.json.77").write_text("{")
+    assert prepare_root(LocalRoot(tmp_path), HEADER) is None
 
 
 def test_another_config_is_refused_and_the_difference_told(tmp_path: Path) -> None:
-    prepare_root(tmp_path, HEADER)
-    HEADER.write(tmp_path)
+    prepare_root(LocalRoot(tmp_path), HEADER)
+    HEADER.write(LocalRoot(tmp_path))
     before = contents(tmp_path)
     other = Header(config={"seed": 0, "scene": {"fabric": "silk"}}, splits={"a": "train", "c": "test"})
     with pytest.raises(InputError, match=r"1 of whose 2 samples.*scene\.fabric: denim -> silk"):
-        prepare_root(tmp_path, other)
+        prepare_root(LocalRoot(tmp_path), other)
     assert contents(tmp_path) == before
 
 
 def test_an_extension_goes_on_in_the_same_folder(tmp_path: Path) -> None:
-    prepare_root(tmp_path, HEADER)
-    HEADER.write(tmp_path)
+    prepare_root(LocalRoot(tmp_path), HEADER)
+    HEADER.write(LocalRoot(tmp_path))
     longer = replace(HEADER, splits={"z": "train", **HEADER.splits})
-    assert prepare_root(tmp_path, longer) == HEADER
+    assert prepare_root(LocalRoot(tmp_path), longer) == HEADER
 
 
 @pytest.mark.parametrize(
@@ -80,23 +82,24 @@ def test_an_extension_goes_on_in_the_same_folder(tmp_path: Path) -> None:
         ("[]", "format must be"),
         ('{"format": "other"}', "format must be 'muslin dataset'"),
         ('{"format": "muslin dataset", "schema_version": "1"}', "not a whole number"),
-        ('{"format": "muslin dataset", "schema_version": 2}', "newer than 1.*update muslin"),
-        ('{"format": "muslin dataset", "schema_version": 1}', "missing 2 required"),
-        ('{"format": "muslin dataset", "schema_version": 1, "config": {}, "splits": {}, "x": 1}', "'x'"),
+        ('{"format": "muslin dataset", "schema_version": 3}', "newer than 2.*update muslin"),
+        ('{"format": "muslin dataset", "schema_version": 1}', "older than 2.*generate the dataset again"),
+        ('{"format": "muslin dataset", "schema_version": 2}', "missing 2 required"),
+        ('{"format": "muslin dataset", "schema_version": 2, "config": {}, "splits": {}, "x": 1}', "'x'"),
     ],
 )
 def test_damaged_and_newer_headers_are_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "muslin.json").write_text(text)
     with pytest.raises(InputError, match=message):
-        read_header(tmp_path)
+        read_header(LocalRoot(tmp_path))
     with pytest.raises(InputError, match=message):
-        prepare_root(tmp_path, HEADER)
+        prepare_root(LocalRoot(tmp_path), HEADER)
     assert [p.name for p in tmp_path.iterdir()] == ["muslin.json"]
 
 
 def test_no_dataset_at_all(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"muslin\.json is missing"):
-        read_header(tmp_path / "nowhere")
+        read_header(LocalRoot(tmp_path / "nowhere"))
 
 
 def test_difference_names_added_removed_and_changed_keys() -> None:

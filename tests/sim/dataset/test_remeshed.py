@@ -13,16 +13,19 @@ import trimesh
 import zarr
 from remeshed_producer import FRAME_TOPOLOGY, remeshed, sheet_at, swayed
 from sheet_producer import RADIUS, make_sample
+from unpacked import chunk_of, entries_of, unpacked
 
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.certify import certify
 from muslin.sim.dataset import store
 from muslin.sim.dataset.certificate import Certificate
+from muslin.sim.dataset.codecs import numcodecs_unremarked
 from muslin.sim.dataset.export import export_dataset
 from muslin.sim.dataset.header import Header, digest, prepare_root
 from muslin.sim.dataset.index import COLUMNS, read_index
 from muslin.sim.dataset.info import info
+from muslin.sim.dataset.local_root import LocalRoot
 from muslin.sim.dataset.parts import read_mesh
 from muslin.sim.dataset.reader import Dataset, open_dataset, write_dataset
 from muslin.sim.dataset.remeshed import RemeshedSequence, sample_of_frames
@@ -40,10 +43,10 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
-    folder = tmp_path / "data"
-    prepare_root(folder, Header(config={}, splits={"sway": ""}))
-    return folder
+def root(tmp_path: Path) -> LocalRoot:
+    place = LocalRoot(tmp_path / "data")
+    prepare_root(place, Header(config={}, splits={"sway": ""}))
+    return place
 
 
 def same_mesh(a: GarmentMesh, b: GarmentMesh) -> None:
@@ -112,7 +115,7 @@ def test_frames_make_the_sample_that_they_need() -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_never_written(root: Path, change: dict, message: str) -> None:
+def test_what_cannot_be_is_never_written(root: LocalRoot, change: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         store.write_sample(root, remeshed(**change))
     assert store.stored_ids(root) == []
@@ -121,14 +124,14 @@ def test_what_cannot_be_is_never_written(root: Path, change: dict, message: str)
 @pytest.mark.parametrize(
     "name", sorted(REMESHED_ARRAYS.keys() - {"face_panel"})
 )  # all zero, so no chunk is stored
-def test_a_damaged_array_is_named_with_a_remedy(root: Path, name: str) -> None:
+def test_a_damaged_array_is_named_with_a_remedy(root: LocalRoot, name: str) -> None:
     store.write_sample(root, remeshed())
-    chunks = store.sample_path(root, "sway") / name / "c"
-    chunk = next(p for p in chunks.rglob("*") if p.is_file())
-    data = bytearray(chunk.read_bytes())
-    data[-1] ^= 0x10
-    chunk.write_bytes(data)
-    with pytest.raises(InputError, match=rf"sway\.zarr/{name}: .*muslin repair"):
+    with unpacked(store.sample_file(root.path, "sway")) as folder:
+        chunk = chunk_of(folder, name)
+        data = bytearray(chunk.read_bytes())
+        data[-1] ^= 0x10
+        chunk.write_bytes(data)
+    with pytest.raises(InputError, match=rf"sway\.zarr\.zip/{name}: .*muslin repair"):
         store.read_sample(root, "sway")
 
 
@@ -142,16 +145,18 @@ def test_a_damaged_array_is_named_with_a_remedy(root: Path, name: str) -> None:
         ("positions", lambda a: a[:-1], "positions has .* rows"),
     ],
 )
-def test_arrays_that_do_not_fit_each_other_are_refused(root: Path, name: str, change, message: str) -> None:
+def test_arrays_that_do_not_fit_each_other_are_refused(
+    root: LocalRoot, name: str, change, message: str
+) -> None:
     # Checksums that match: what a faulty writer would leave.
     store.write_sample(root, remeshed())
-    path = store.sample_path(root, "sway")
-    group = zarr.open_group(zarr.storage.LocalStore(path), mode="r+")
-    array = np.ascontiguousarray(change(np.asarray(group[name][...])))
-    del group[name]
-    group.create_array(name, data=array)
-    group.attrs["sha256"] = {**group.attrs["sha256"], name: store._sha256(array)}
-    with pytest.raises(InputError, match=rf"sway\.zarr: {message}"):
+    with unpacked(store.sample_file(root.path, "sway")) as folder, numcodecs_unremarked():
+        group = zarr.open_group(zarr.storage.LocalStore(folder), mode="r+")
+        array = np.ascontiguousarray(change(np.asarray(group[name][...])))
+        del group[name]
+        group.create_array(name, data=array)
+        group.attrs["sha256"] = {**group.attrs["sha256"], name: store._sha256(array)}
+    with pytest.raises(InputError, match=rf"sway\.zarr\.zip: {message}"):
         store.read_sample(root, "sway")
 
 
@@ -160,13 +165,12 @@ def test_only_samples_that_need_it_are_of_the_newer_schema(dataset: Dataset, tmp
     assert versions == {"still": 1, "sway": 2}
     assert "topologies" not in store.read_meta(dataset.root, "still")[0]
     fixed = write_dataset(tmp_path / "fixed", [make_sample("still", frames=2)])
-    for file in ("zarr.json", "positions/zarr.json"):
-        a, b = (store.sample_path(data.root, "still") / file for data in (dataset, fixed))
-        assert a.read_bytes() == b.read_bytes()
+    a, b = (store.sample_file(data.root.path, "still") for data in (dataset, fixed))
+    assert entries_of(a) == entries_of(b)
     import pyarrow.parquet as parquet
 
-    assert parquet.read_schema(fixed.root / INDEX).names == COLUMNS.names
-    assert parquet.read_schema(dataset.root / INDEX).names == [*COLUMNS.names, "topologies"]
+    assert parquet.read_schema(fixed.root.path / INDEX).names == COLUMNS.names
+    assert parquet.read_schema(dataset.root.path / INDEX).names == [*COLUMNS.names, "topologies"]
 
 
 def test_index_and_summary_count_topologies(dataset: Dataset) -> None:
@@ -175,11 +179,12 @@ def test_index_and_summary_count_topologies(dataset: Dataset) -> None:
     assert dataset.rows[1]["vertices"] == sheet_at(0.11).num_vertices
     found = info(dataset.root)
     assert (found.sequences_made, found.remeshed, found.frames) == (2, 1, 2 + FRAMES)
-    (dataset.root / INDEX).rename(dataset.root / "kept")
+    folder = dataset.root.path
+    (folder / INDEX).rename(folder / "kept")
     try:
         assert read_index(dataset.root, dataset.header) == list(dataset.rows)
     finally:
-        (dataset.root / "kept").rename(dataset.root / INDEX)
+        (folder / "kept").rename(folder / INDEX)
 
 
 def test_verification_finds_the_one_bad_frame(tmp_path: Path) -> None:
@@ -195,12 +200,12 @@ def test_verification_finds_the_one_bad_frame(tmp_path: Path) -> None:
 
 def test_verification_validates_every_topology(tmp_path: Path) -> None:
     write_dataset(tmp_path / "data", [remeshed()])
-    path = store.sample_path(tmp_path / "data", "sway")
-    group = zarr.open_group(zarr.storage.LocalStore(path), mode="r+")
-    vertices = np.asarray(group["panel_vertices"][...])
-    vertices[-1, 0] = np.nan  # of the last topology
-    group["panel_vertices"][...] = vertices
-    group.attrs["sha256"] = {**group.attrs["sha256"], "panel_vertices": store._sha256(vertices)}
+    with unpacked(store.sample_file(tmp_path / "data", "sway")) as folder:
+        group = zarr.open_group(zarr.storage.LocalStore(folder), mode="r+")
+        vertices = np.asarray(group["panel_vertices"][...])
+        vertices[-1, 0] = np.nan  # of the last topology
+        group["panel_vertices"][...] = vertices
+        group.attrs["sha256"] = {**group.attrs["sha256"], "panel_vertices": store._sha256(vertices)}
     result = verify(tmp_path / "data", workers=1)
     assert "panel_vertices" in result.failed["sway"]
 
@@ -271,6 +276,6 @@ def test_a_point_cache_is_refused_with_a_remedy(dataset: Dataset, tmp_path: Path
 def test_a_dataset_of_the_older_form_is_read(tmp_path: Path) -> None:
     made = write_dataset(tmp_path / "data", [make_sample("old", frames=2)])
     meta, _ = store.read_meta(made.root, "old")
-    file = store.sample_path(made.root, "old") / "zarr.json"
-    assert json.loads(file.read_text())["attributes"]["meta_sha256"] == digest(meta | {"schema_version": 1})
+    values = json.loads(entries_of(store.sample_file(tmp_path / "data", "old"))["zarr.json"])
+    assert values["attributes"]["meta_sha256"] == digest(meta | {"schema_version": 1})
     assert type(open_dataset(made.root)["old"]) is Sample

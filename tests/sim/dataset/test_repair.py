@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sheet_producer import files_of, make_scene, sheets_config, simulate
+from unpacked import chunk_of, replace_file, unpacked
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
@@ -18,6 +19,7 @@ from muslin.sim.dataset.generate import generate
 from muslin.sim.dataset.info import info
 from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.repair import RepairReport, repair
+from muslin.sim.dataset.root import open_root
 from muslin.sim.dataset.sample import BodyTrack
 from muslin.sim.dataset.schema import FAILED, INDEX, SAMPLES
 from muslin.sim.dataset.verify import verify
@@ -43,50 +45,57 @@ def mend(root: Path, dry: bool = False) -> RepairReport:
 def flip_a_bit(file: Path, bit: int) -> None:
     data = bytearray(file.read_bytes())
     data[bit // 8] ^= 1 << bit % 8
-    file.write_bytes(data)
+    replace_file(file, data)
 
 
 def flip_in_a_chunk(sample: Path) -> None:
-    chunk = max(
-        (sample / "positions" / "c").rglob("*"), key=lambda file: file.stat().st_size * file.is_file()
-    )
-    flip_a_bit(chunk, 4 * chunk.stat().st_size)
-
-
-def chunks(sample: Path) -> dict[str, bytes]:
-    files = sorted((sample / "positions").rglob("*"))
-    return {str(file.relative_to(sample)): file.read_bytes() for file in files if file.is_file()}
+    with unpacked(sample) as folder:
+        chunk = chunk_of(folder, "positions")
+        flip_a_bit(chunk, 4 * chunk.stat().st_size)
 
 
 def truncate_attributes(sample: Path) -> None:
-    file = sample / "zarr.json"
-    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    with unpacked(sample) as folder:
+        file = folder / "zarr.json"
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
 
 
 def empty_a_chunk(sample: Path) -> None:
-    next(file for file in (sample / "positions" / "c").rglob("*") if file.is_file()).write_bytes(b"")
+    with unpacked(sample) as folder:
+        chunk_of(folder, "positions").write_bytes(b"")
 
 
 def delete_an_array(sample: Path) -> None:
-    shutil.rmtree(sample / "uv")
+    with unpacked(sample) as folder:
+        shutil.rmtree(folder / "uv")
 
 
 def delete_a_chunk(sample: Path) -> None:
-    shutil.rmtree(sample / "positions" / "c")
+    with unpacked(sample) as folder:
+        shutil.rmtree(folder / "positions" / "c")
 
 
-def make_it_a_file(sample: Path) -> None:
-    shutil.rmtree(sample)
-    sample.write_bytes(b"not a folder")
+def make_it_no_archive(sample: Path) -> None:
+    sample.write_bytes(b"not a sample")
 
 
-# By place: the start, the middle and the end of a chain of four, another's middle, and the sequence twice.
+def cut_it(sample: Path) -> None:
+    sample.write_bytes(sample.read_bytes()[: sample.stat().st_size // 2])
+
+
+def empty_it(sample: Path) -> None:
+    sample.write_bytes(b"")
+
+
+# By place: the start, the middle and the end of a chain of four, most of another, and the sequence.
 DAMAGES = {
     0: truncate_attributes,
     2: flip_in_a_chunk,
     3: delete_an_array,
+    4: cut_it,
     5: empty_a_chunk,
-    6: make_it_a_file,
+    6: make_it_no_archive,
+    7: empty_it,
     8: delete_a_chunk,
 }
 
@@ -106,8 +115,8 @@ def test_damaged_samples_are_set_aside_and_made_again(whole: Path, data: Path) -
     ids = open_dataset(data).ids
     names = tuple(ids[place] for place in DAMAGES)
     for place, damage in DAMAGES.items():
-        damage(store.sample_path(data, ids[place]))
-    stamps = {name: store.sample_path(data, name).stat().st_mtime_ns for name in set(ids) - set(names)}
+        damage(store.sample_file(data, ids[place]))
+    stamps = {name: store.sample_file(data, name).stat().st_mtime_ns for name in set(ids) - set(names)}
     listed = mend(data, dry=True)
     assert tuple(listed.damaged) == names
     assert not listed.passed
@@ -115,23 +124,25 @@ def test_damaged_samples_are_set_aside_and_made_again(whole: Path, data: Path) -
     report = mend(data)
     assert report.passed
     assert (report.made, tuple(report.damaged), report.failed) == (names, names, {})
-    assert report.aside == {name: data / FAILED / f"{name}.zarr-1" for name in names}
-    assert all(place.exists() for place in report.aside.values())
+    assert report.aside == {name: str(data / FAILED / f"{name}.zarr.zip-1") for name in names}
+    assert all(Path(place).is_file() for place in report.aside.values())
     assert_same(data, whole)
-    assert stamps == {name: store.sample_path(data, name).stat().st_mtime_ns for name in stamps}
+    assert stamps == {name: store.sample_file(data, name).stat().st_mtime_ns for name in stamps}
     assert mend(data) == RepairReport(checked=9, damaged={})
 
 
 def test_nothing_set_aside_is_ever_replaced(whole: Path, data: Path) -> None:
     name = open_dataset(data).ids[0]
-    stranger = data / FAILED / f"{name}.zarr-2"
-    stranger.mkdir(parents=True)
+    stranger = data / FAILED / f"{name}.zarr.zip-2"
+    stranger.parent.mkdir()
+    stranger.write_bytes(b"mine")
     for place in ("1", "3"):
-        flip_in_a_chunk(store.sample_path(data, name))
-        damaged = chunks(store.sample_path(data, name))
+        flip_in_a_chunk(store.sample_file(data, name))
+        damaged = store.sample_file(data, name).read_bytes()
         (aside,) = mend(data).aside.values()
-        assert aside == data / FAILED / f"{name}.zarr-{place}"
-        assert chunks(aside) == damaged
+        assert aside == str(data / FAILED / f"{name}.zarr.zip-{place}")
+        assert Path(aside).read_bytes() == damaged
+    assert stranger.read_bytes() == b"mine"
     assert_same(data, whole)
     assert verify(data, workers=1).samples == info(data).samples == 9, "what is set aside is no sample"
 
@@ -144,7 +155,7 @@ def test_missing_samples_and_a_damaged_index_are_made_too(whole: Path, data: Pat
     assert (report.made, report.passed) == ((), True)
     assert_same(data, whole)
     gone = open_dataset(data).ids[5]
-    shutil.rmtree(store.sample_path(data, gone))
+    store.sample_file(data, gone).unlink()
     assert mend(data).made == (gone,), "listed in the index"
     (data / INDEX).unlink()
     shutil.rmtree(data / SAMPLES)
@@ -156,10 +167,10 @@ def test_missing_samples_and_a_damaged_index_are_made_too(whole: Path, data: Pat
 def test_a_sample_that_intersects_is_made_again(whole: Path, data: Path) -> None:
     """Its bytes match their checksum: only its geometry tells."""
     name = open_dataset(data).ids[4]
-    sample = store.read_sample(data, name)
+    sample = store.read_sample(open_root(data), name)
     sample.positions[:, :, 1] = 0.1
-    shutil.rmtree(store.sample_path(data, name))
-    store.write_sample(data, sample)
+    store.sample_file(data, name).unlink()
+    store.write_sample(open_root(data), sample)
     report = mend(data)
     assert "cloth-body intersections" in report.damaged[name]
     assert report.made == (name,)
@@ -173,7 +184,7 @@ def other_simulate(*arguments: object) -> object:
 @pytest.mark.parametrize("how_many", [1, 9])
 def test_what_another_solver_made_is_refused_before_anything_is_moved(data: Path, how_many: int) -> None:
     for name in open_dataset(data).ids[:how_many]:
-        flip_in_a_chunk(store.sample_path(data, name))
+        flip_in_a_chunk(store.sample_file(data, name))
     before = {file: file.read_bytes() for file in data.rglob("*") if file.is_file()}
     with pytest.raises(InputError, match=r"another solver.*install what made them"):
         repair(data, workers=1, simulate=other_simulate, make_scene=make_scene)  # type: ignore[arg-type]
@@ -181,9 +192,9 @@ def test_what_another_solver_made_is_refused_before_anything_is_moved(data: Path
 
 
 def test_a_damaged_sample_that_no_config_plans_is_refused(data: Path) -> None:
-    extra = store.sample_path(data, "extra")
-    shutil.copytree(store.sample_path(data, open_dataset(data).ids[0]), extra)
-    flip_in_a_chunk(store.sample_path(data, open_dataset(data).ids[0]))
+    extra = store.sample_file(data, "extra")
+    shutil.copy(store.sample_file(data, open_dataset(data).ids[0]), extra)
+    flip_in_a_chunk(store.sample_file(data, open_dataset(data).ids[0]))
     with pytest.raises(InputError, match=r"extra: not planned by the dataset's config"):
         mend(data)
     assert not (data / FAILED).exists()
@@ -209,7 +220,7 @@ def test_samples_of_another_body_file_are_not_taken_for_damaged(tmp_path: Path) 
     assert "has digest" in verify(root, workers=1).failed[name]
     with pytest.raises(InputError, match="put the file back that they were made with"):
         repair(root, workers=1, simulate=worn_by_another, make_scene=make_scene)
-    assert store.sample_path(root, name).exists()
+    assert store.sample_file(root, name).exists()
 
 
 def worn_by_another(scenes, device, progress):  # type: ignore[no-untyped-def]
@@ -228,22 +239,26 @@ def sunk(scenes, device, progress):  # type: ignore[no-untyped-def]
 
 
 def test_no_flipped_bit_escapes_or_stops_verification(data: Path) -> None:
-    """Bits of arrays and attributes drawn at random: the sample fails, or holds what it held."""
+    """Bits drawn at random, of an entry that is packed again, or of the file: the sample fails, or holds what
+    it held."""
     name = open_dataset(data).ids[4]
-    known = store.read_sample(data, name)
-    files = [file for file in store.sample_path(data, name).rglob("*") if file.is_file()]
+    root, file = open_root(data), store.sample_file(data, name)
+    known, whole = store.read_sample(root, name), file.read_bytes()
     draw = random.Random(7)
     found = 0
-    for _ in range(60):
-        file = draw.choice(files)
-        bit = draw.randrange(8 * file.stat().st_size)
-        flip_a_bit(file, bit)
+    for entry in [True] * 60 + [False] * 20:
+        if entry:
+            with unpacked(file) as folder:
+                chosen = draw.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+                flip_a_bit(chosen, draw.randrange(8 * chosen.stat().st_size))
+        else:
+            flip_a_bit(file, draw.randrange(8 * len(whole)))
         report = verify(data, ids=[name], workers=1)
         found += not report.passed
         if report.passed:
-            sample = store.read_sample(data, name)
+            sample = store.read_sample(root, name)
             assert np.array_equal(sample.positions, known.positions)
             assert sample.certificate == known.certificate
-        flip_a_bit(file, bit)
+        replace_file(file, whole)
     assert found > 20
     assert verify(data, ids=[name], workers=1).passed

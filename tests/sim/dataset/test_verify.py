@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sheet_producer import RADIUS, ball, make_sample
+from unpacked import chunk_of, unpacked
 
 from muslin.garments.errors import InputError
 from muslin.sim.body import load_body
@@ -123,15 +124,19 @@ def test_another_body_than_the_one_it_was_made_with_fails(tmp_path: Path) -> Non
 
 def test_damaged_samples_fail_and_the_rest_is_checked(tmp_path: Path) -> None:
     root = tmp_path / "data"
-    write_dataset(root, [make_sample(name) for name in ("array", "gone", "good", "header")])
-    chunk = next(p for p in (store.sample_path(root, "array") / "positions" / "c").rglob("*") if p.is_file())
-    chunk.write_bytes(b"\0" * 40)
-    (store.sample_path(root, "header") / "zarr.json").write_text("{")
-    store.sample_path(root, "gone").rename(tmp_path / "elsewhere")
+    write_dataset(root, [make_sample(name) for name in ("array", "gone", "good", "header", "torn")])
+    with unpacked(store.sample_file(root, "array")) as folder:
+        chunk_of(folder, "positions").write_bytes(b"\0" * 40)
+    with unpacked(store.sample_file(root, "header")) as folder:
+        (folder / "zarr.json").write_text("{")
+    store.sample_file(root, "gone").rename(tmp_path / "elsewhere")
+    torn = store.sample_file(root, "torn")
+    torn.write_bytes(torn.read_bytes()[:-1000])
     report = verify(root, workers=1)
-    assert (report.samples, report.frames) == (4, 1)
-    assert report.failed.keys() == {"array", "gone", "header"}
-    assert "array.zarr/positions" in report.failed["array"]
+    assert (report.samples, report.frames) == (5, 1)
+    assert list(report.failed) == ["array", "gone", "header", "torn"]
+    assert "torn.zarr.zip: not readable" in report.failed["torn"]
+    assert "array.zarr.zip/positions" in report.failed["array"]
     assert "is missing" in report.failed["gone"]
     assert "zarr.json: not readable" in report.failed["header"]
 
@@ -139,7 +144,7 @@ def test_damaged_samples_fail_and_the_rest_is_checked(tmp_path: Path) -> None:
 def test_samples_not_made_yet_are_missing_not_failed(tmp_path: Path) -> None:
     root = tmp_path / "data"
     write_dataset(root, [make_sample("a"), make_sample("b")])
-    store.sample_path(root, "b").rename(tmp_path / "elsewhere")
+    store.sample_file(root, "b").rename(tmp_path / "elsewhere")
     (root / "index.parquet").unlink()
     report = verify(root, workers=1)
     assert (report.samples, report.missing, report.passed) == (1, 1, True)
