@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import platform
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+
+from benchmarks.record import machine, write
 
 OUT = Path("out/benchmarks")
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -61,7 +60,7 @@ def compare(
     left_out = "".join(f"- **{name}** was left out: {why}\n" for name, why in absent.items())
     table = side_by_side.table(results) + left_out
     (out / "compare.md").write_text(f"{machine()}\n\n{table}", encoding="utf-8")
-    _write(out / "compare.json", {"results": side_by_side.as_json(results), "left_out": absent})
+    write(out / "compare.json", {"results": side_by_side.as_json(results), "left_out": absent})
     typer.echo(table)
 
 
@@ -92,7 +91,7 @@ def remesh(
     left_out = "".join(f"- **{name}** was left out: {why}\n" for name, why in absent.items())
     table = side_by_side.table(cases, results) + left_out
     (out / "remesh.md").write_text(f"{machine()}\n\n{table}", encoding="utf-8")
-    _write(out / "remesh.json", {"results": side_by_side.as_json(results), "left_out": absent})
+    write(out / "remesh.json", {"results": side_by_side.as_json(results), "left_out": absent})
     typer.echo(table)
 
 
@@ -108,7 +107,7 @@ def transfer(
 
     given, found = transfers(source, [int(size) for size in sizes.split(",")], seeds, typer.echo)
     text = table(given, found)
-    _write(out / "transfer.json", [asdict(row) for row in found])
+    write(out / "transfer.json", [asdict(row) for row in found])
     (out / "transfer.md").write_text(text, encoding="utf-8")
     typer.echo(text)
 
@@ -184,7 +183,7 @@ def surface(
     results = side_by_side.compare(pairs, peers, out, rounds, core, typer.echo)
     text = side_by_side.table(results)
     (out / "surface.md").write_text(f"{machine()}\n\n{text}", encoding="utf-8")
-    _write(out / "surface.json", {name: asdict(result) for name, result in results.items()})
+    write(out / "surface.json", {name: asdict(result) for name, result in results.items()})
     typer.echo(text)
 
 
@@ -207,7 +206,7 @@ def agreement(
     rows = side_by_side.compare(pairs, peers, out, typer.echo)
     text = side_by_side.table(rows)
     (out / "agreement.md").write_text(text, encoding="utf-8")
-    _write(out / "agreement.json", [asdict(row) for row in rows])
+    write(out / "agreement.json", [asdict(row) for row in rows])
     typer.echo(text)
 
 
@@ -226,7 +225,7 @@ def reach(
 
     sizes, asked = [int(n) for n in vertices.split(",")], [float(d) for d in distortions.split(",")]
     found = reached(presets.split(","), sizes, asked, seeds, typer.echo)
-    _write(out / "reach.json", [asdict(row) for row in found])
+    write(out / "reach.json", [asdict(row) for row in found])
 
 
 @app.command()
@@ -237,7 +236,7 @@ def adaptive(out: Out = OUT / "adaptive", rounds: Rounds = 3) -> None:
     drapes = measure(rounds, typer.echo)
     out.mkdir(parents=True, exist_ok=True)
     text = table(drapes)
-    _write(out / "adaptive.json", [asdict(drape) for drape in drapes])
+    write(out / "adaptive.json", [asdict(drape) for drape in drapes])
     (out / "adaptive.md").write_text(text, encoding="utf-8")
     plot(drapes, out / "adaptive.png")
     typer.echo(text)
@@ -263,7 +262,7 @@ def drape(
             f"beta {cost.beta:.2f}: {cost.cpu_seconds:.2f} CPU s, {cost.steps} steps, "
             f"at rest {cost.at_rest}, residual {residual}, {cost.intersections} intersections"
         )
-    _write(out / "drape.json", [asdict(cost) for cost in costs])
+    write(out / "drape.json", [asdict(cost) for cost in costs])
 
 
 @app.command()
@@ -278,7 +277,7 @@ def growth(
 
     found = measure_growth([int(size) for size in sizes.split(",")], frames, out, core, typer.echo)
     typer.echo(f"exponent {found.exponent:.2f}")
-    _write(out / "growth.json", asdict(found))
+    write(out / "growth.json", asdict(found))
 
 
 @app.command()
@@ -302,7 +301,7 @@ def rest(
                 f"{preset}, {figures.vertices} vertices: mean {rule[0]:.2f}, p99 {rule[1]:.2f} mm from rest; "
                 f"by a detour {detour[0]:.2f}, {detour[1]:.2f} mm"
             )
-    _write(out / "rest.json", found)
+    write(out / "rest.json", found)
 
 
 @app.command()
@@ -326,7 +325,7 @@ def steps(
             f"{row.max_iterations} iterations, linear_tolerance {row.linear_tolerance}: "
             f"mean {row.mean:.2f}, p99 {row.p99:.2f} mm, {row.cpu_ms:.0f} CPU ms"
         )
-    _write(out / "steps.json", [asdict(row) for row in found])
+    write(out / "steps.json", [asdict(row) for row in found])
 
 
 @app.command()
@@ -342,7 +341,7 @@ def workers(
 
     found = measure_workers(samples, edge_length, rounds, out, cores, typer.echo)
     typer.echo(f"two over one: {found.gain.text()}")
-    _write(out / "workers.json", asdict(found))
+    write(out / "workers.json", asdict(found))
 
 
 @app.command()
@@ -358,7 +357,7 @@ def engine(
 
     found = measure_overhead(chains, chain, edge_length, rounds, out, typer.echo)
     typer.echo(f"engine over bare, {found.samples} drapes: {found.ratio.text(3)}")
-    _write(out / "engine.json", asdict(found))
+    write(out / "engine.json", asdict(found))
 
 
 @app.command()
@@ -370,21 +369,25 @@ def memory(
 
     peak = peak_memory(seconds, out, core)
     typer.echo(f"{peak / 1e9:.2f} GB")
-    _write(out / "memory.json", {"peak_bytes": peak})
+    write(out / "memory.json", {"peak_bytes": peak})
 
 
-def machine() -> str:
-    """The processor, system and Python that figures were taken on."""
-    described = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    model = next(
-        (line.split(":")[1].strip() for line in described if line.startswith("model name")), "unknown"
-    )
-    return f"{model}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+@app.command()
+def soak(
+    samples: Annotated[int, typer.Option(min=9, help="Of the dataset.")] = 200,
+    faults: Annotated[int, typer.Option(min=1, help="That befall its making, at least.")] = 50,
+    seed: Annotated[int, typer.Option(help="Of their order and moments.")] = 0,
+    out: Out = OUT / "soak",
+) -> None:
+    """Make a dataset in peace and amid faults; exit code 1 unless both are the same; write soak.md."""
+    from benchmarks.soak import soak as endure
 
-
-def _write(path: Path, values: Any) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({"machine": machine(), "values": values}, indent=1), encoding="utf-8")
+    found = endure(out, samples, faults, seed, typer.echo)
+    write(out / "soak.json", asdict(found))
+    (out / "soak.md").write_text(f"{machine()}\n\n{found.table()}", encoding="utf-8")
+    typer.echo(found.table())
+    if not found.passed:
+        raise typer.Exit(1)
 
 
 if __name__ == "__main__":

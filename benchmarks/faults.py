@@ -50,19 +50,20 @@ def flip_bit(file: Path, draw: random.Random) -> None:
 
     The archive's own words are left alone: some of them, such as the times of files, say nothing.
     """
-    data = bytearray(file.read_bytes())
-    with zipfile.ZipFile(io.BytesIO(bytes(data))) as archive:
+    data = file.read_bytes()
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
         chunks = [entry for entry in archive.infolist() if "/c/" in entry.filename and entry.file_size]
     chunk = draw.choice(chunks)
     place = chunk.header_offset + 30 + len(chunk.filename) + draw.randrange(chunk.file_size)
-    data[place] ^= 1 << draw.randrange(8)
-    file.write_bytes(data)
+    with file.open("r+b") as stream:
+        stream.seek(place)
+        stream.write(bytes([data[place] ^ 1 << draw.randrange(8)]))
 
 
 def truncate(file: Path, draw: random.Random) -> None:
     """Cut the end of a file off."""
-    data = file.read_bytes()
-    file.write_bytes(data[: draw.randrange(len(data))])
+    with file.open("r+b") as stream:
+        stream.truncate(draw.randrange(file.stat().st_size))
 
 
 def workers_of(pid: int) -> list[int]:
@@ -104,7 +105,7 @@ def send(pid: int, signal: int) -> bool:
     return True
 
 
-def wait_until(met: Callable[[], object], what: str, seconds: float = 120.0) -> None:
+def wait_until(met: Callable[[], object], what: str, seconds: float = 300.0) -> None:
     """Look again and again whether a condition is met. TimeoutError if it is not."""
     end = time.monotonic() + seconds
     while not met():

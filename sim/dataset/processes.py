@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.process
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -25,6 +27,19 @@ def usable_cores() -> int:
 def leave_interrupts_to_parent() -> None:
     """Ctrl-C reaches every process of a terminal; only the parent shall answer."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _begin(start: Callable[[], None]) -> None:
+    """In a process of a pool: end with the parent, whose death a pool's processes do not see."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    start()
+
+
+def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
 
 
 def worker_died(workers: int, note: str = "") -> InputError:
@@ -72,7 +87,10 @@ def in_processes(
         yield from map(run, tasks)
         return
     context, count = multiprocessing.get_context("spawn"), min(workers, len(tasks))
-    with one_thread_each(), ProcessPoolExecutor(count, mp_context=context, initializer=start) as pool:
+    with (
+        one_thread_each(),
+        ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(start,)) as pool,
+    ):
         try:
             yield from pool.map(run, tasks, chunksize=chunk)
         except BrokenProcessPool as error:

@@ -35,11 +35,13 @@ def mend(out: str | Path) -> RepairReport:
     return repair(out, workers=1, simulate=simulate, make_scene=make_scene)
 
 
-def start(out: str | Path, environment: dict[str, str] | None = None, **how: Any) -> subprocess.Popen[str]:
-    """A process that makes the dataset; see `sheets_main` for `how`."""
+def start(
+    out: str | Path, environment: dict[str, str] | None = None, before: Path | None = None, **how: Any
+) -> subprocess.Popen[str]:
+    """A process that makes the dataset; see `sheets_main` for `how`. Modules are found in `before` first."""
     return subprocess.Popen(
         [sys.executable, str(HERE / "sheets_main.py"), str(out), json.dumps(how)],
-        env=environment_of(environment),
+        env=environment_of(environment, before),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -47,10 +49,10 @@ def start(out: str | Path, environment: dict[str, str] | None = None, **how: Any
     )
 
 
-def environment_of(more: dict[str, str] | None = None) -> dict[str, str]:
+def environment_of(more: dict[str, str] | None = None, before: Path | None = None) -> dict[str, str]:
     """In which processes find what this one finds."""
-    before = os.environ.get("PYTHONPATH", "")
-    paths = os.pathsep.join(path for path in (str(HERE), str(HERE.parent), before) if path)
+    found = [before, HERE, HERE.parent, os.environ.get("PYTHONPATH")]
+    paths = os.pathsep.join(str(path) for path in found if path)
     return os.environ | {"PYTHONPATH": paths} | (more or {})
 
 

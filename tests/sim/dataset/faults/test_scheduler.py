@@ -7,10 +7,10 @@ import time
 from pathlib import Path
 
 import pytest
-from dask_processes import dask_processes
 from distributed import Client
-from sheets import make, start, stored
+from sheets import environment_of, make, start, stored
 
+from benchmarks.dask_processes import dask_processes
 from benchmarks.faults import Contents, contents, send, wait_until
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import engine
@@ -20,7 +20,7 @@ from muslin.sim.dataset.engine import LOST_S, Cluster
 def test_without_its_scheduler_a_run_ends_and_says_so(undisturbed: Contents, tmp_path: Path) -> None:
     hold, out = tmp_path / "hold", tmp_path / "data"
     hold.touch()
-    with dask_processes(tmp_path / "dask", {"FAULT_HOLD": str(hold)}) as dask:
+    with dask_processes(tmp_path / "dask", environment_of({"FAULT_HOLD": str(hold)})) as dask:
         address, scheduler = dask.scheduler()
         dask.worker()
         killed: list[float] = []
@@ -41,7 +41,7 @@ def test_without_its_scheduler_a_run_ends_and_says_so(undisturbed: Contents, tmp
 def test_a_killed_run_leaves_the_workers_of_a_scheduler_free(undisturbed: Contents, tmp_path: Path) -> None:
     hold, out = tmp_path / "hold", tmp_path / "data"
     hold.touch()
-    with dask_processes(tmp_path / "dask", {"FAULT_HOLD": str(hold)}) as dask:
+    with dask_processes(tmp_path / "dask", environment_of({"FAULT_HOLD": str(hold)})) as dask:
         address, _ = dask.scheduler()
         dask.worker()
         run = start(out, scheduler=address)
@@ -62,7 +62,7 @@ def test_a_killed_run_leaves_the_workers_of_a_scheduler_free(undisturbed: Conten
 def test_a_worker_that_is_asked_to_end_puts_its_samples_back(undisturbed: Contents, tmp_path: Path) -> None:
     hold, out = tmp_path / "hold", tmp_path / "data"
     hold.touch()
-    with dask_processes(tmp_path / "dask", {"FAULT_HOLD": str(hold)}) as dask:
+    with dask_processes(tmp_path / "dask", environment_of({"FAULT_HOLD": str(hold)})) as dask:
         address, _ = dask.scheduler()
         first = dask.worker()
         left = [first]

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from sheets import environment_of
-
 from benchmarks.faults import descendants, send, wait_until
-
-KILL = 9
 
 
 class DaskProcesses:
     """Processes of dask on this machine, each told where the others are by a file."""
 
-    def __init__(self, folder: Path, environment: dict[str, str] | None = None) -> None:
-        self.folder, self.environment = folder, environment or {}
+    def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
+        self.folder, self.environment = folder, environment
         self.begun: list[subprocess.Popen[bytes]] = []
 
     def scheduler(self) -> tuple[str, subprocess.Popen[bytes]]:
@@ -51,9 +49,7 @@ class DaskProcesses:
             *arguments,
         ]
         with (self.folder / f"{name}.log").open("ab") as log:
-            process = subprocess.Popen(
-                command, env=environment_of(self.environment), cwd=self.folder, stdout=log, stderr=log
-            )
+            process = subprocess.Popen(command, env=self.environment, cwd=self.folder, stdout=log, stderr=log)
         self.begun.append(process)
         return process
 
@@ -61,15 +57,15 @@ class DaskProcesses:
         """Kill whatever of them still runs."""
         for process in self.begun:
             for pid in descendants(process.pid):
-                send(pid, KILL)
+                send(pid, signal.SIGKILL)
             process.kill()
             process.wait()
 
 
 @contextmanager
-def dask_processes(folder: Path, environment: dict[str, str] | None = None) -> Iterator[DaskProcesses]:
+def dask_processes(folder: Path, environment: Mapping[str, str] = os.environ) -> Iterator[DaskProcesses]:
     """Processes of dask, none of which survives the block."""
-    folder.mkdir()
+    folder.mkdir(parents=True, exist_ok=True)
     processes = DaskProcesses(folder, environment)
     try:
         yield processes
