@@ -235,7 +235,7 @@ def _started(cluster: Cluster) -> Iterator[Engine]:
         with local, Client(local) as client:
             client.register_plugin(_Interrupts())
             try:
-                yield Engine(client, client.dashboard_link if page else "", log)
+                yield Engine(client, client.dashboard_link if page else "", _log=log)
             except BaseException:
                 _kill(local)
                 raise
