@@ -53,8 +53,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Storage:
-    """raw: bytes of all positions as float32; on_disk: {array: bytes in the dataset as it is}; seconds: of
-    reading frames drawn at random through `Dataset.frame`, each sample for the first time, then again."""
+    """raw: bytes of all positions as float32; on_disk: {array: bytes in the dataset as it is}, with those of
+    `attributes` and what the `archive` itself takes; first, again: seconds of reading frames drawn at random
+    through `Dataset.frame`, each sample for the first time, then again."""
 
     samples: int
     frames: int
@@ -136,11 +137,14 @@ def _add(row: Row, truth: np.ndarray, positions: np.ndarray) -> None:
 def _on_disk(dataset: Dataset) -> dict[str, int]:
     sizes: dict[str, int] = {}
     for sample_id in dataset.ids:
-        packed = io.BytesIO(dataset.root.read(store.sample_name(sample_id)))
-        with zipfile.ZipFile(packed) as archive:
+        data = dataset.root.read(store.sample_name(sample_id))
+        rest = len(data)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
             for entry in archive.infolist():
                 name = "attributes" if entry.filename.endswith("zarr.json") else entry.filename.split("/")[0]
                 sizes[name] = sizes.get(name, 0) + entry.file_size
+                rest -= entry.file_size
+        sizes["archive"] = sizes.get("archive", 0) + rest
     return sizes
 
 

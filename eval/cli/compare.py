@@ -79,17 +79,17 @@ def evaluate(
 ) -> None:
     """Score a prediction: errors of vertices, motion, surfaces and wrinkles; strain, penetration, crossings.
 
-    Either side is a dataset, one sample (DIR/samples/ID.zarr), a file (.obj .ply .glb .stl .off .npy .npz
-    .pkl .pc2 .pc16 .usd .abc), a folder of meshes, or a folder with a file or a folder a sample, named as it;
-    their topology may change from frame to frame. Vertices without faces take those of the other side if the
-    counts agree. Meshes of different topology get vertex and velocity errors if both tell panel space and are
-    of one pattern, else surface distances only.
+    Either side is a dataset, one sample (DIR/samples/ID.zarr.zip), a file (.obj .ply .glb .stl .off .npy
+    .npz .pkl .pc2 .pc16 .usd .abc), a folder of meshes, or a folder with a file or a folder a sample, named
+    as it; their topology may change from frame to frame. Vertices without faces take those of the other side
+    if the counts agree. Meshes of different topology get vertex and velocity errors if both tell panel space
+    and are of one pattern, else surface distances only.
 
     \b
     Examples:
       muslin eval out/prediction out/demo --json eval.json --html eval.html
       muslin eval frames_a/ frames_b/ --fps 30
-      muslin eval rollout.pkl out/demo/samples/walk.zarr --fps 30
+      muslin eval rollout.pkl out/demo/samples/walk.zarr.zip --fps 30
       muslin eval predictions/ out/demo --scale 0.01 --up z
       muslin eval mine.npy theirs/Tshirt.pc16 --body body.npz
       muslin eval out/prediction out/demo --baseline base.json --tolerance vertex_error_mm.mean=0.02

@@ -10,7 +10,6 @@ import typer
 
 from muslin.eval.cli.options import Force, SampleId, check_new
 from muslin.garments.errors import InputError
-from muslin.sim.remesh.distortion import MAX_DISTORTION
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,12 +19,14 @@ if TYPE_CHECKING:
     from muslin.sim.remesh.settings import RemeshSettings
     from muslin.sim.remesh.topology import Remeshed
 
+MAX_DISTORTION = 2.5  # that of `muslin.sim.remesh.distortion`, which loads scipy
 MOST_TOPOLOGIES = 10_000
 
 
 def remesh(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="A sample (DIR/samples/ID.zarr), a dataset, or MESH.obj.")
+        Path,
+        typer.Argument(metavar="SOURCE", help="A sample (DIR/samples/ID.zarr.zip), a dataset, or MESH.obj."),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="FILE.obj.")],
     target_area: Annotated[

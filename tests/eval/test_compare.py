@@ -84,7 +84,7 @@ def test_matching_by_key_when_ids_differ(tmp_path, make_sample):
 def test_single_sample_folder(tmp_path, make_sample):
     write_dataset(tmp_path / "t", [make_sample("one"), make_sample("two", height=0.3)])
     samples = tmp_path / "t" / "samples"
-    result = compare(samples / "one.zarr", samples / "two.zarr")
+    result = compare(samples / "one.zarr.zip", samples / "two.zarr.zip")
     assert result.figures["vertex_error_mm"]["mean"] == pytest.approx(90.0, abs=1e-3)
 
 

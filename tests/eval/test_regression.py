@@ -196,8 +196,8 @@ def test_content_hash_follows_content_and_not_place(tmp_path, make_sample):
         write_dataset(tmp_path / name, [made])
     hashes = {name: content_hash(tmp_path / name) for name in "abc"}
     assert hashes["a"] == hashes["b"] != hashes["c"]
-    one = content_hash(tmp_path / "a" / "samples" / "sheet.zarr")
-    assert one == content_hash(tmp_path / "b" / "samples" / "sheet.zarr")
+    one = content_hash(tmp_path / "a" / "samples" / "sheet.zarr.zip")
+    assert one == content_hash(tmp_path / "b" / "samples" / "sheet.zarr.zip")
     assert one not in hashes.values()
     (tmp_path / "m.obj").write_text("v 0 0 0\n")
     before = content_hash(tmp_path / "m.obj")

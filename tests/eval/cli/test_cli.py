@@ -67,13 +67,14 @@ def test_repair_lists_what_is_damaged_and_moves_nothing_that_it_cannot_make_agai
     assert (
         "2 samples checked, 0 damaged, 0 missing, 0 made" in muslin("repair", dataset, "--workers", 1).output
     )
-    attributes = dataset / "samples" / "still.zarr" / "zarr.json"
-    attributes.write_bytes(attributes.read_bytes()[:100])
+    sample = dataset / "samples" / "still.zarr.zip"
+    sample.write_bytes(sample.read_bytes()[:-100])
+    damaged = sample.read_bytes()
     listed = muslin("repair", dataset, "--workers", 1, "--dry-run", code=1).output
     assert "still: " in listed
     assert "1 damaged" in listed
     refused("repair", dataset, "--workers", 1, says="not planned by the dataset's config")
-    assert attributes.stat().st_size == 100
+    assert sample.read_bytes() == damaged
     assert not (dataset / "failed").exists()
 
 
@@ -221,8 +222,8 @@ def test_no_dataset_is_one_line(command, tmp_path):
 
 
 def test_damaged_sample_is_one_line(dataset):
-    meta = dataset / "samples" / "still.zarr" / "zarr.json"
-    meta.write_text(meta.read_text()[:40])
+    sample = dataset / "samples" / "still.zarr.zip"
+    sample.write_bytes(sample.read_bytes()[:40])
     refused("eval", dataset, dataset, says="still")
 
 

@@ -48,7 +48,7 @@ def panels(tmp_path) -> Path:
 
 def test_a_sample_is_remeshed_off_its_body(dataset, tmp_path, make_sample):
     out = tmp_path / "new" / "out.obj"
-    line = remesh(dataset / "samples" / "still.zarr", "--target-area", 1e-3, "--out", out).output
+    line = remesh(dataset / "samples" / "still.zarr.zip", "--target-area", 1e-3, "--out", out).output
     mesh, positions = drape(out)
     assert mesh.face_areas.mean() == pytest.approx(1e-3, rel=0.01)
     np.testing.assert_allclose(positions[:, 1], 0.21, atol=1e-6)
