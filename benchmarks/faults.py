@@ -40,7 +40,9 @@ def _entries(data: bytes) -> dict[str, bytes]:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
     values = json.loads(entries["zarr.json"])
-    values["attributes"]["meta"]["certificate"].pop("seconds")
+    certificate = values["attributes"]["meta"]["certificate"]
+    certificate.pop("seconds")
+    certificate["extra"].pop("seconds_per_frame", None)
     values["attributes"].pop("meta_sha256")
     return entries | {"zarr.json": json.dumps(values).encode()}
 

@@ -18,7 +18,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.cloth_arrays import VERTICES
 from muslin.sim.dataset.codecs import numcodecs_unremarked
-from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.root import Root, StoreError
 
 OPEN_SAMPLES = 2048
 """How many samples are kept open for the next frame."""
@@ -39,6 +39,8 @@ def read_frame(root: Root, sample_id: str, frame: int) -> NDArray[np.float32]:
     path = f"{store.sample_place(root, sample_id)}/positions"
     try:
         positions = np.asarray(opened.array[rows])
+    except StoreError:
+        raise
     except store.UNREADABLE as error:
         raise InputError(f"{path}: frame {frame} is not readable ({error}); {store.REMEDY}") from error
     if not np.isfinite(positions).all():
@@ -75,6 +77,8 @@ def _open(root: Root, sample_id: str, stamp: Hashable) -> _Opened:
     try:
         with numcodecs_unremarked():
             array = group["positions"]
+    except StoreError:
+        raise
     except store.UNREADABLE as error:
         raise InputError(f"{place}/positions/zarr.json: not readable ({error}); {store.REMEDY}") from error
     if not isinstance(array, zarr.Array) or (array.shape, array.dtype) != (shape, np.float32):

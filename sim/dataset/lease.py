@@ -62,7 +62,9 @@ class _Lease:
         self.lost = False
 
     def take(self, beat: float, dead: float) -> None:
-        if self.root.create(self.name, self._content()):
+        if (
+            self.root.create(self.name, self._content()) or self._mine()
+        ):  # created, if only its answer was lost
             return
         before, since = self._seen(), time.monotonic()
         while time.monotonic() - since < dead:

@@ -14,17 +14,16 @@ from fsspec.core import url_to_fs
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.lease import hold_lease
-from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.root import Root, StoreError
 from muslin.sim.dataset.schema import LOCK
 
 Found = TypeVar("Found")
 
 WAITS_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0)
 """Pauses between tries of an access that fails; the clients of stores try some times of their own at each."""
-
-
-class StoreError(OSError):
-    """A store that did not answer as it should, time after time."""
+_FIRST_WAITS_S = WAITS_S[:2]
+"""As long as this process has had no answer yet: an address that is wrong is told soon."""
+_answered: set[str] = set()
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class RemoteRoot(Root):
         return self.url
 
     def exists(self, name: str) -> bool:
-        return bool(self._try(lambda fs, path: fs.isfile(path), name))
+        return self.stamp(name) is not None  # `isfile` of fsspec takes a store that fails for an absent file
 
     def names(self, folder: str = "") -> list[str]:
         def listed(fs: Any, path: str) -> list[str]:
@@ -99,14 +98,16 @@ class RemoteRoot(Root):
 
         def reach(fs: Any, path: str) -> None:
             bucket = path.split("/", 1)[0]
-            if not fs.exists(bucket):
-                fs.mkdir(bucket)
+            if bucket:
+                fs.info(bucket)
 
         try:
             self._try(reach, "")
+        except StoreError:
+            raise
         except OSError as error:
             raise InputError(
-                f"{self}: cannot be used ({error}); check the address, the keys and the bucket"
+                f"{self}: cannot be used ({error}); make the bucket, or check address and keys"
             ) from error
 
     def clean(self) -> None:
@@ -128,17 +129,22 @@ class RemoteRoot(Root):
             known = ", ".join(sorted(fsspec.available_protocols()))
             raise InputError(f"{self}: no store of this kind ({error}); fsspec knows {known}") from error
         path = self._path(fs, name)
-        for wait in (*WAITS_S, None):
+        waits = WAITS_S if self.url in _answered else _FIRST_WAITS_S
+        for wait in (*waits, None):
             try:
-                return access(fs, path)
+                found = access(fs, path)
             except (FileNotFoundError, FileExistsError, PermissionError, NotImplementedError):
+                _answered.add(self.url)
                 raise
             except Exception as error:  # clients of stores raise errors of their own kinds
                 if wait is None:
                     raise StoreError(
-                        f"{self.place(name)}: the store failed {len(WAITS_S) + 1} times "
+                        f"{self.place(name)}: the store failed {len(waits) + 1} times "
                         f"({type(error).__name__}: {error})"
                     ) from error
+            else:
+                _answered.add(self.url)
+                return found
             time.sleep(wait)
         raise AssertionError
 

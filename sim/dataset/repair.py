@@ -16,7 +16,7 @@ from muslin.sim.dataset.generate import generate
 from muslin.sim.dataset.header import read_header
 from muslin.sim.dataset.index import stored_rows, write_index
 from muslin.sim.dataset.progress import Progress
-from muslin.sim.dataset.root import Root, open_root
+from muslin.sim.dataset.root import Root, StoreError, open_root
 from muslin.sim.dataset.schema import HEADER
 from muslin.sim.dataset.verify import verify
 from muslin.sim.dataset.worker import ChainSimulator
@@ -125,6 +125,8 @@ def _check_bodies(root: Root, ids: Iterable[str]) -> None:
     for sample_id in ids:
         try:
             body = store.read_meta(root, sample_id)[0]["body"]
+        except StoreError:
+            raise
         except InputError:
             continue  # damaged: it is made again
         if body:

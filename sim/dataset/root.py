@@ -7,6 +7,12 @@ from collections.abc import Hashable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from muslin.garments.errors import InputError
+
+
+class StoreError(InputError, OSError):
+    """A store that did not answer as it should, time after time: it says nothing of what lies there."""
+
 
 class Root(ABC):
     """The files of one dataset, by names relative to it with `/` between folders.

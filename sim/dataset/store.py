@@ -18,7 +18,7 @@ from muslin.sim.dataset.codecs import create_array, numcodecs_unremarked
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.packed import PackedStore, pack
 from muslin.sim.dataset.remeshed import RemeshedSequence
-from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.root import Root, StoreError
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.dataset.schema import (
     ARRAYS,
@@ -106,10 +106,14 @@ def open_sample(root: Root, sample_id: str) -> zarr.Group:
         store = PackedStore(root, sample_name(sample_id))
     except FileNotFoundError as error:
         raise InputError(f"{place}: the sample is missing; run `muslin generate` again to make it") from error
+    except StoreError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(f"{place}: not readable ({error}); {REMEDY}") from error
     try:
         return zarr.open_group(store, mode="r", zarr_format=3)
+    except StoreError:
+        raise
     except UNREADABLE as error:
         raise InputError(f"{place}/zarr.json: not readable ({error}); {REMEDY}") from error
 
@@ -245,6 +249,8 @@ def _read_array(group: zarr.Group, place: str, name: str, checksum: str) -> np.n
     try:
         with numcodecs_unremarked():
             array = np.asarray(group[name][...])  # type: ignore[index]
+    except StoreError:
+        raise
     except UNREADABLE as error:
         raise InputError(f"{place}/{name}: not readable ({error}); {REMEDY}") from error
     if _sha256(array) != checksum:

@@ -23,7 +23,7 @@ from muslin.sim.dataset.processes import (
     leave_interrupts_to_parent,
     usable_cores,
 )
-from muslin.sim.dataset.root import Root, open_root
+from muslin.sim.dataset.root import Root, StoreError, open_root
 from muslin.sim.dataset.sample import Sample
 
 FRAMES_A_TASK = 24
@@ -180,6 +180,8 @@ def _start_worker() -> None:
 def _run(task: _Task) -> Finding:
     try:
         return verify_sample(_sample(task.root, task.sample_id), task.start, task.stop)
+    except StoreError:
+        raise
     except InputError as error:
         return Finding(task.sample_id, reason=str(error))
 

@@ -20,7 +20,7 @@ from muslin.sim.dataset.root import open_root
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[3]
-SECONDS = 180.0
+SECONDS = 600.0
 """More than anything here takes on any machine."""
 
 
