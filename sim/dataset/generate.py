@@ -96,7 +96,7 @@ def generate(
     """
     root = open_root(out)
     started = time.perf_counter()
-    where = cluster or Cluster(workers=workers or (None if device == "cpu" else 1))
+    where = cluster or Cluster(workers=1 if workers is None and device != "cpu" else workers)
     planned = plan(config)
     strangers = sorted(set(again) - planned.splits.keys())
     if strangers:

@@ -102,7 +102,7 @@ def make_sample(
 
 def make_scene(values: dict[str, Any]) -> dict[str, Any]:
     """The scene as it is; ValueError for what a sheet does not know, as pydantic would raise."""
-    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "stuck_at", "die"}
+    unknown = values.keys() - {"garment", "body", "motion", "fabric", "fail_at", "stuck_at", "die_at"}
     if unknown:
         raise ValueError(f"unknown key {min(unknown)}")
     return values
@@ -111,25 +111,28 @@ def make_scene(values: dict[str, Any]) -> dict[str, Any]:
 def simulate(
     scenes: list[dict[str, Any]], device: str, progress: Callable[[int, int], None] | None
 ) -> Iterator[Sample]:
-    """Samples of a chain of scenes; fails at shape `fail_at`, is stuck at `stuck_at`, `die` ends the process.
+    """Samples of a chain of scenes; fails at shape `fail_at`, is stuck at `stuck_at`, dies at `die_at`.
 
-    SHEET_DELAY s each; shapes whose beta is above SHEET_HOLD are never done.
+    SHEET_FAULTS, a JSON object, says where for all scenes. SHEET_DELAY s each; shapes whose beta is above
+    SHEET_HOLD are never done.
     """
     phase = 0.0
     hold = float(os.environ.get("SHEET_HOLD", "inf"))
+    everywhere = json.loads(os.environ.get("SHEET_FAULTS", "{}"))
     for done, scene in enumerate(scenes):
         beta = scene.get("body", {}).get("beta", [0.0])
         phase += beta[0]
         time.sleep(float(os.environ.get("SHEET_DELAY", "0")))
         while beta[0] > hold:
             time.sleep(1.0)
-        if scene.get("fail_at") == beta[0]:
+        faults = everywhere | scene
+        if faults.get("fail_at") == beta[0]:
             raise InputError(f"cannot dress shape {beta[0]}")
-        if scene.get("stuck_at") == beta[0]:
+        if faults.get("stuck_at") == beta[0]:
             here = make_sample().positions[0].astype(np.float64)
             state = LastState(here, np.zeros_like(here), sheet().faces, ball()[0][0], ball()[1])
             raise SimulationError("frame 3: cloth [7] is stuck", state)
-        if scene.get("die"):
+        if faults.get("die_at") == beta[0]:
             os._exit(9)
         frames = 1 if "motion" not in scene else round(scene["motion"]["end"] * scene["motion"]["fps"])
         yield make_sample("unnamed", frames=frames, phase=phase)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import random
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +22,25 @@ from sheet_producer import files_of, make_scene, sheets_config, simulate
 from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.config import DatasetConfig, parse_config
+from muslin.sim.dataset.engine import Cluster
 from muslin.sim.dataset.generate import GenerateReport, generate, solver_digest
+from muslin.sim.dataset.header import installed_versions
 from muslin.sim.dataset.plan import plan
+from muslin.sim.dataset.quarantine import quarantined_ids, read_quarantined
 from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.repair import repair
+from muslin.sim.dataset.root import open_root
 from muslin.sim.dataset.schema import FAILED, INDEX, PARTIAL, SAMPLES
 
 MAIN = Path(__file__).parent / "sheet_main.py"
 
 
-def run(config: DatasetConfig, out: Path, workers: int = 1) -> GenerateReport:
-    return generate(config, out, workers=workers, simulate=simulate, make_scene=make_scene)
+def run(config: DatasetConfig, out: Path, workers: int = 1, **more: Any) -> GenerateReport:
+    return generate(config, out, workers=workers, simulate=simulate, make_scene=make_scene, **more)
+
+
+def stored_ids(out: Path) -> list[str]:
+    return store.stored_ids(open_root(out))
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +77,12 @@ def test_what_is_there_is_kept_and_what_is_gone_is_made_again(whole: Path, tmp_p
     # The third of a chain of four: it must be made from the start of its chain, the others must not be
     # touched.
     for name in (ids[2], ids[8]):
-        for file in sorted(store.sample_path(out, name).rglob("*"), reverse=True):
-            file.unlink() if file.is_file() else file.rmdir()
-        store.sample_path(out, name).rmdir()
-    stamps = {name: store.sample_path(out, name).stat().st_mtime_ns for name in store.stored_ids(out)}
+        store.sample_file(out, name).unlink()
+    stamps = {name: store.sample_file(out, name).stat().st_mtime_ns for name in stored_ids(out)}
     report = run(sheets_config(), out)
     assert report.made == (ids[2], ids[8])
     assert files_of(out) == before
-    assert stamps == {name: store.sample_path(out, name).stat().st_mtime_ns for name in stamps}
+    assert stamps == {name: store.sample_file(out, name).stat().st_mtime_ns for name in stamps}
 
 
 def test_extension_adds_and_keeps(tmp_path: Path) -> None:
@@ -95,34 +104,95 @@ def test_extension_adds_and_keeps(tmp_path: Path) -> None:
     assert files_of(tmp_path / "data") == before
 
 
-def test_a_chain_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None:
-    config = sheets_config()
-    values = config.model_dump() | {"scene": {"fail_at": config.shapes[0].sweep.start}}
-    report = run(parse_config(values), tmp_path / "data")
-    assert len(report.made) == 5
-    assert len(report.failed) == 4
-    assert set(report.failed.values()) == {"InputError: cannot dress shape -1.0"}
-    assert open_dataset(tmp_path / "data").missing == tuple(report.failed)
+@pytest.fixture
+def faults(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[str, float]], None]:
+    """faults({"fail_at": beta}): what goes wrong in simulations that begin after it; nothing with {}."""
+    return lambda found: monkeypatch.setenv("SHEET_FAULTS", json.dumps(found))
 
 
-def test_a_chain_that_is_stuck_leaves_its_last_good_state(tmp_path: Path) -> None:
-    config = sheets_config()
-    start = config.shapes[0].sweep.start
-    report = run(parse_config(config.model_dump() | {"scene": {"stuck_at": start}}), tmp_path / "data")
-    assert (len(report.made), len(report.failed)) == (5, 4)
-    kept = tmp_path / "data" / FAILED / f"{next(iter(report.failed))}.npz"
-    assert set(report.failed.values()) == {
+def second_beta() -> float:
+    """Of the second drape of the first chain."""
+    return float(plan(sheets_config()).chains[0].jobs[1].scene["body"]["beta"][0])
+
+
+def test_a_chain_that_fails_is_told_and_left_alone_until_asked_for(
+    whole: Path, tmp_path: Path, faults: Callable[[dict[str, float]], None]
+) -> None:
+    out = tmp_path / "data"
+    first, failed, *behind = (job for job in plan(sheets_config()).chains[0].jobs)
+    faults({"fail_at": second_beta()})
+    report = run(sheets_config(), out)
+    rest = {job.id: f"comes after {failed.id} in its chain" for job in behind}
+    assert report.failed == {failed.id: f"InputError: cannot dress shape {second_beta()}"} | rest
+    assert (len(report.made), report.held) == (6, ())
+    assert first.id in report.made
+    assert open_dataset(out).missing == tuple(report.failed)
+    assert quarantined_ids(open_root(out)) == {failed.id}
+    entry = read_quarantined(open_root(out), failed.id)
+    assert (entry.id, entry.reason, entry.seed) == (failed.id, report.failed[failed.id], failed.seed)
+    assert entry.log[0].startswith("Traceback")
+    assert entry.log[-1].endswith(entry.reason)
+    assert entry.scenes == (first.scene, failed.scene)
+    assert (entry.command, entry.state) == (f"muslin repair {out} --sample {failed.id} --workers 1", "")
+    assert entry.versions == installed_versions()
+
+    faults({})
+    before = files_of(out)
+    again = run(sheets_config(), out)
+    assert (again.made, again.failed, again.held) == ((), {}, (failed.id, *rest))
+    assert files_of(out) == before
+    assert read_quarantined(open_root(out), failed.id) == entry
+    lifted = run(sheets_config(), out, retry=True)
+    assert (lifted.made, lifted.failed, lifted.held) == ((failed.id, *rest), {}, ())
+    assert not quarantined_ids(open_root(out))
+    assert files_of(out) == files_of(whole)
+
+
+def test_a_chain_that_is_stuck_leaves_its_last_good_state_until_it_is_repaired(
+    whole: Path, tmp_path: Path, faults: Callable[[dict[str, float]], None]
+) -> None:
+    out = tmp_path / "data"
+    failed = plan(sheets_config()).chains[0].jobs[1].id
+    faults({"stuck_at": second_beta()})
+    report = run(sheets_config(), out)
+    assert (len(report.made), len(report.failed)) == (6, 3)
+    kept = out / FAILED / f"{failed}.npz"
+    assert report.failed[failed] == (
         f"SimulationError: frame 3: cloth [7] is stuck; the last good state is in {kept}"
-    }
+    )
+    assert read_quarantined(open_root(out), failed).state == str(kept)
     with np.load(kept) as state:
         assert state["faces"].max() < len(state["positions"]) == len(state["velocity"])
-    open_dataset(tmp_path / "data")
+    assert len(open_dataset(out)) == 6
+
+    faults({})
+    mended = repair(out, workers=1, simulate=simulate, make_scene=make_scene)
+    assert mended.passed
+    assert mended.made == tuple(report.failed)
+    assert not list((out / FAILED).iterdir())
+    assert files_of(out) == files_of(whole)
 
 
-def test_a_worker_that_dies_is_told_with_a_remedy(tmp_path: Path) -> None:
-    config = parse_config({"kind": "drape", "scene": {"die": True}})
-    with pytest.raises(InputError, match=r"a worker process died.*fewer --workers"):
-        run(config, tmp_path / "data")
+def test_a_worker_that_dies_is_replaced_and_its_sample_given_up_in_the_end(
+    whole: Path, tmp_path: Path, faults: Callable[[dict[str, float]], None]
+) -> None:
+    """What was committed before counts as made, and chains beside it are finished."""
+    out = tmp_path / "data"
+    first, failed, *behind = (job.id for job in plan(sheets_config()).chains[0].jobs)
+    faults({"die_at": second_beta()})
+    report = run(sheets_config(), out, workers=None, cluster=Cluster(workers=1, retries=1))
+    assert list(report.failed) == [failed, *behind]
+    assert "the worker process died, 2 times" in report.failed[failed]
+    assert len(report.made) == 6
+    assert first in report.made
+    entry = read_quarantined(open_root(out), failed)
+    assert (entry.reason, len(entry.scenes), entry.state) == (report.failed[failed], 2, "")
+    assert entry.log, "what nannies said of it"
+    assert f"repair {out} --sample {failed}" in entry.command
+    faults({})
+    assert run(sheets_config(), out).held == (failed, *behind)
+    assert run(sheets_config(), out, retry=True).made == (failed, *behind)
+    assert files_of(out) == files_of(whole)
 
 
 def test_a_scene_that_cannot_be_is_refused_before_anything_is_written(tmp_path: Path) -> None:
@@ -193,14 +263,15 @@ def test_killed_at_any_moment_it_completes_to_the_same_dataset(whole: Path, tmp_
         process = start(out, delay, workers, hold)
         wait_for_samples(out, kept + 1)
         time.sleep(moments.uniform(0.0, 2 * delay))
-        orphans = children(process.pid)
+        orphans = descendants(process.pid)
+        assert len(orphans) >= workers
         process.send_signal(how)
         process.communicate(timeout=120)
         wait_until_gone(orphans)
-        before, kept = kept, len(store.stored_ids(out))
+        before, kept = kept, len(stored_ids(out))
         assert before < kept
-        for name in store.stored_ids(out):
-            store.read_sample(out, name)
+        for name in stored_ids(out):
+            store.read_sample(open_root(out), name)
     last = start(out, 0.0)
     told, _ = last.communicate(timeout=120)
     assert told.split() == [str(9 - kept), str(kept), "0"]
@@ -223,13 +294,19 @@ def start(out: Path, delay: float, workers: int = 1, hold: float = math.inf) -> 
 
 def wait_for_samples(out: Path, count: int) -> None:
     end = time.monotonic() + 120.0
-    while not (out / SAMPLES).is_dir() or len(store.stored_ids(out)) < count:
+    while not (out / SAMPLES).is_dir() or len(stored_ids(out)) < count:
         assert time.monotonic() < end
         time.sleep(0.002)
 
 
-def children(pid: int) -> list[int]:
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+def descendants(pid: int) -> list[int]:
+    """Workers, whichever thread started them, and what they start."""
+    try:
+        threads = list(Path(f"/proc/{pid}/task").iterdir())
+        found = [int(child) for thread in threads for child in (thread / "children").read_text().split()]
+    except (FileNotFoundError, ProcessLookupError):
+        return []
+    return [each for child in found for each in (child, *descendants(child))]
 
 
 def wait_until_gone(pids: list[int]) -> None:
