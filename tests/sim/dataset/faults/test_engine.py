@@ -7,6 +7,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+import psutil
+
 from muslin.sim.dataset.engine import Cluster, Died, Done, News, open_engine
 
 
@@ -32,3 +35,20 @@ def deadly_one(task: int, tell: Callable[[Any], None]) -> int:
     if task == 0:
         os._exit(9)
     return task
+
+
+def test_a_worker_that_is_nearly_full_goes_on() -> None:
+    with open_engine(Cluster(workers=1, memory="600MB")) as engine:
+        ended = [event.found for event in engine.run(hoard, range(2)) if isinstance(event, Done)]
+    assert len(set(ended)) == 1  # one process did both
+
+
+HOARD: list[np.ndarray] = []
+
+
+def hoard(task: int, tell: Callable[[Any], None]) -> int:
+    """Fill the process to seven eighths of what it may have, and keep that; its id."""
+    missing = 525_000_000 - psutil.Process().memory_info().rss
+    HOARD.append(np.ones(max(0, missing) // 8))
+    time.sleep(1.0)  # until the memory is looked at
+    return os.getpid()
