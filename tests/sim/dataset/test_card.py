@@ -108,7 +108,7 @@ def test_what_somebody_wrote_is_left_as_it_is(sheets: Path, tmp_path: Path) -> N
     (out / CARD).unlink()
     (out / CARD).mkdir()
     dataset = open_dataset(out)
-    assert not write_card(out, dataset.header, dataset.rows, plan(config).jobs)
+    assert not write_card(dataset.root, dataset.header, dataset.rows, plan(config).jobs)
 
 
 def test_a_begun_dataset_says_so_and_absolute_paths_are_cut() -> None:
