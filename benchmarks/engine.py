@@ -13,23 +13,7 @@ from pathlib import Path
 
 from benchmarks.isolated import ONE_THREAD
 from benchmarks.spread import Spread, paired_ratio
-
-MUSLIN_COMMAND = Path(sys.executable).with_name("muslin")
-
-DATASET = """\
-name = "engine"
-kind = "drape"
-chain = {chain}
-[scene]
-fabric = "gray-interlock"
-garment = {{ edge_length = {edge_length} }}
-body = {{ model = "female" }}
-[[designs]]
-name = "tshirt"
-preset = "tshirt"
-[[shapes]]
-sweep = {{ component = 0, start = -2.0, stop = 2.0, count = {samples} }}
-"""
+from benchmarks.workers import DATASET, MUSLIN_COMMAND
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ MUSLIN_COMMAND = Path(sys.executable).with_name("muslin")
 DATASET = """\
 name = "workers"
 kind = "drape"
-chain = 1
+chain = {chain}
 [scene]
 fabric = "gray-interlock"
 garment = {{ edge_length = {edge_length} }}
@@ -50,7 +50,7 @@ def measure_workers(
     """Make the same drapes with one worker and with two, turn by turn."""
     out.mkdir(parents=True, exist_ok=True)
     config = out / "workers.toml"
-    config.write_text(DATASET.format(edge_length=edge_length, samples=samples), encoding="utf-8")
+    config.write_text(DATASET.format(chain=1, edge_length=edge_length, samples=samples), encoding="utf-8")
     hourly: dict[int, list[float]] = {1: [], 2: []}
     for number in range(1, rounds + 1):
         for workers, made in hourly.items():
