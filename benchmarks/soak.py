@@ -197,11 +197,12 @@ class _Trouble:
         self.before: list[str] = []
 
     def make(self, count: int) -> None:
-        """All faults; those that a run survives befall it one after the other."""
+        """All faults, spread over the making of the dataset: the n-th comes when n / count of it is there."""
         kinds = [(RUNNING + RESTING)[n % len(RUNNING + RESTING)] for n in range(count)]
         self.draw.shuffle(kinds)
-        for kind in kinds:
+        for number, kind in enumerate(kinds):
             begun = time.monotonic()
+            self._come_to(number / count)
             if kind in RESTING:
                 self._rest(kind)
             elif kind == "scheduler SIGKILL":
@@ -214,6 +215,14 @@ class _Trouble:
                 f"{len(self.run.stored())} samples"
             )
         self._stop()
+
+    def _come_to(self, share: float) -> None:
+        """Let runs go on until such a share of the samples is there, or all that can be without a repair."""
+        while not self.run.planned() or len(self.run.stored()) < share * planned(self.run.data):
+            if self.complete():
+                return
+            self.before = self.run.stored()
+            self._until(self._going(), lambda _: self.run.stored() != self.before, "another sample")
 
     def _rest(self, kind: str) -> None:
         wait_until(self._some_stored, "the first samples", _PATIENCE_S)
@@ -252,9 +261,7 @@ class _Trouble:
     def _befall(self, kind: str, process: subprocess.Popen[bytes]) -> bool:
         """Do it. False if the run was over before."""
         if kind == "second generator":
-            codes = {self.run.generate("--workers", "1").wait(_PATIENCE_S)}
-            codes.add(process.wait(_PATIENCE_S) if 2 not in codes else 2)
-            return 2 in codes
+            return self._second(process)
         target, name = kind.split()
         number = getattr(signal, name)
         if target == "worker":
@@ -265,6 +272,18 @@ class _Trouble:
         self._ended(process, _ENDS[kind])
         wait_until(lambda: not any(map(alive, others)), "the processes of a run that was ended", 60.0)
         return True
+
+    def _second(self, first: subprocess.Popen[bytes]) -> bool:
+        """Whether one of two generators is told of the other, which goes on."""
+        second = self.run.generate("--workers", "2")
+        both = (first, second)
+        wait_until(lambda: any(one.poll() is not None for one in both), "an end of one of two", _PATIENCE_S)
+        self.process = second if first.poll() is not None else first
+        ended = first if self.process is second else second
+        self.tell(f"   exit code {ended.returncode}")
+        if self.process is second:
+            self.repairing = False
+        return ended.returncode == 2
 
     def _scheduler(self) -> None:
         self._stop()
@@ -323,6 +342,11 @@ class _Trouble:
             self._ended(self.process, _ENDS["client SIGTERM"])
             self.made["client SIGTERM"] += 1
         self.process = None
+
+
+def planned(data: Path) -> int:
+    """Number of samples that a dataset shall have."""
+    return len(read_header(open_root(data)).splits)
 
 
 def missing(data: Path) -> bool:

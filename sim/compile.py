@@ -10,7 +10,6 @@ import warp as wp
 from muslin.sim.dataset.header import digest
 from muslin.sim.dataset.solver import solver_digest
 from muslin.sim.device import open_device
-from muslin.sim.run import compile_kernels
 
 
 def compile_once(device: str = "cpu") -> None:
@@ -25,5 +24,8 @@ def compile_once(device: str = "cpu") -> None:
     with (folder / "muslin.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not done.exists():
+            # Loaded only where it is needed: the client of a cluster simulates nothing itself.
+            from muslin.sim.run import compile_kernels
+
             compile_kernels(device)
             done.touch()

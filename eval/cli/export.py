@@ -86,7 +86,7 @@ def export(
     else:
         chosen = select(source, split, conditions, samples or None)
         with progress_bar("export") as update:
-            files = export_dataset(source, out, file_format, ids=chosen.ids, body=body, progress=update)
+            files = export_dataset(chosen, out, file_format, body=body, progress=update)
     typer.echo(f"{out}: {len(files)} files")
 
 

@@ -71,7 +71,7 @@ def generate(
 
     loaded = load_config(config, overrides or [], preset)
     name = check_device(device)
-    cluster = cluster_of(workers, scheduler, memory, retries, name)
+    cluster = cluster_of(workers, scheduler, memory, retries)
     note = f"{out}: what was finished is kept; run again to go on"
     with terminated_like_interrupted(note), progress_bar("generate") as update:
         result = run(loaded, out, cluster=cluster, device=name, progress=update, retry=retry, picture=picture)

@@ -50,13 +50,13 @@ def check_device(device: str) -> str:
     return "cuda:0" if device == "cuda" else device
 
 
-def cluster_of(workers: int | None, scheduler: str | None, memory: str, retries: int, device: str) -> Cluster:
+def cluster_of(workers: int | None, scheduler: str | None, memory: str, retries: int) -> Cluster:
     """The cluster that the options ask for. Raises InputError for options that exclude each other."""
     from muslin.sim.dataset.engine import Cluster
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers and --scheduler exclude each other: a scheduler has workers of its own")
-    return Cluster(workers or (None if device == "cpu" else 1), scheduler, memory, retries)
+    return Cluster(workers, scheduler, memory, retries)
 
 
 def check_new(path: Path, force: bool = False) -> Path:

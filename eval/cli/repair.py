@@ -49,7 +49,7 @@ def repair(
     from muslin.sim.dataset.repair import repair as run
 
     name = check_device(device)
-    cluster = cluster_of(workers, scheduler, memory, retries, name)
+    cluster = cluster_of(workers, scheduler, memory, retries)
     note = f"{dataset}: what was finished is kept; run again to go on"
     with terminated_like_interrupted(note), progress_bar("repair") as update:
         result = run(

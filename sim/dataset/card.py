@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomli_w
 
-from muslin.sim.dataset import licences
 from muslin.sim.dataset.header import Header, digest
 from muslin.sim.dataset.jobs import Job
+from muslin.sim.dataset.licences import sources_of
 from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.schema import CARD, PICTURE
 
@@ -50,13 +51,13 @@ def card_text(
     the folders of files that the config names by absolute paths.
     """
     made = {row["id"] for row in rows}
-    scenes = [job.scene for job in jobs if job.id in made]
+    scenes = {job.id: job.scene for job in jobs if job.id in made}
     parts = [
         f"{MARK}\n# {header.config.get('name', 'dataset')}",
         *([f"![Some of the samples]({PICTURE})"] if picture else []),
         _what(header, rows),
         "## Samples\n\n" + _counts(rows),
-        "## Parameters\n\n" + _parameters(scenes),
+        "## Parameters\n\n" + _parameters([*scenes.values()]),
         "## Certificates\n\n" + _certificates(rows),
         "## Sources\n\n" + _sources(rows, scenes),
         "## Loading\n\n" + _loading(rows),
@@ -165,35 +166,17 @@ def _certificates(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _sources(rows: Sequence[Mapping[str, Any]], scenes: Sequence[Mapping[str, Any]]) -> str:
-    layers = [layer for scene in scenes for layer in scene.get("layers") or ()]
-    garments = [scene.get("garment") or {} for scene in scenes] + layers
-    bodies = _names(row["body"] for row in rows)
-    motions = _names(clip for scene in scenes for clip in _clips(scene.get("motion") or {}))
-    fabrics = _names([row["fabric"] for row in rows] + [layer.get("fabric") for layer in layers])
-    patterns = _names(garment.get("pattern") or garment.get("mesh") for garment in garments)
-    lines = [["body", _file_name(name), *licences.body_source(name)] for name in bodies]
-    lines += [["motion", _file_name(name), *licences.motion_source(name)] for name in motions]
-    lines += [["fabric", _file_name(name), *licences.fabric_source(name)] for name in fabrics]
-    lines += [["garment", _file_name(name), *licences.OWN] for name in patterns]
+def _sources(rows: Sequence[Mapping[str, Any]], scenes: Mapping[str, Mapping[str, Any]]) -> str:
+    found = {source for row in rows for source in sources_of(scenes[row["id"]], row["body"], row["fabric"])}
     text = "The licence of the dataset is its maker's to choose. These are the terms of what went into it"
-    if not lines:
+    if not found:
         return text + ": nothing but muslin (Apache-2.0)."
+    lines = [astuple(source) for source in sorted(found)]
     return (
         text
         + "; `NOTICE` of muslin (Apache-2.0) has them in full.\n\n"
         + _table(("", "name", "source", "terms"), lines)
     )
-
-
-def _clips(motion: Mapping[str, Any]) -> list[Any]:
-    """The clips that a motion is made of."""
-    walk = motion.get("random_walk") or {}
-    return [motion.get("clip"), *motion.get("into", ()), *walk.get("among", ())]
-
-
-def _names(given: Iterable[Any]) -> list[str]:
-    return list(dict.fromkeys(name for name in given if isinstance(name, str) and name))
 
 
 def _loading(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -19,7 +19,7 @@ import uuid
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 import dask
@@ -65,7 +65,7 @@ _CONFIG = {
 class Cluster:
     """Which workers do it.
 
-    workers      processes on this machine; one a usable core unless given
+    workers      processes on this machine; one a usable core unless given, on a GPU one
     scheduler    address of a running dask scheduler, whose workers do it instead
     memory       of a worker on this machine, such as "4GB"; a worker that needs more is replaced, as if it
                  had died. An equal share of the machine's unless given
@@ -82,6 +82,14 @@ class Cluster:
             raise InputError(f"workers = {self.workers}: must be 1 or more")
         if self.retries < 0:
             raise InputError(f"retries = {self.retries}: must be 0 or more")
+
+    def fitted(self, tasks: int, device: str) -> Cluster:
+        """With no more workers than tasks; where no number was given, a usable core each on the CPU, and one
+        on a GPU."""
+        if self.scheduler is not None:
+            return self
+        usual = usable_cores() if device == "cpu" else 1
+        return replace(self, workers=min(tasks, self.workers or usual))
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,6 @@ class Engine:
 
     client: Client
     dashboard: str = ""
-    _every: float = NEWS_S
     _log: deque[str] = field(default_factory=lambda: deque(maxlen=_LOG_LINES))
 
     def run(
@@ -131,10 +138,13 @@ class Engine:
         waiting = iter(enumerate(tasks))
         begun: dict[Future, int] = {}
         try:
-            ahead, looked = self._ahead(), time.monotonic()
+            threads, looked = self._threads(), time.monotonic()
             while True:
-                while len(begun) < ahead and (item := next(waiting, None)) is not None:
-                    begun[self._submit(function, *item, topic, events)] = item[0]
+                while (
+                    len(begun) < max(_LEAST_AHEAD, _AHEAD * threads)
+                    and (item := next(waiting, None)) is not None
+                ):
+                    begun[self._submit(function, *item, topic, events, threads)] = item[0]
                 if not begun:
                     return
                 try:
@@ -152,29 +162,26 @@ class Engine:
                     continue
                 yield Done(begun.pop(event), found)
                 if time.monotonic() - looked > 10.0:
-                    ahead, looked = self._ahead(), time.monotonic()
+                    threads, looked = self._threads(), time.monotonic()
         finally:
             with contextlib.suppress(OSError, RuntimeError, ClosedClientError):  # of a scheduler that is gone
                 self.client.cancel(list(begun))
                 self.client.unsubscribe_topic(topic)
 
-    def _submit(self, function: Any, place: int, task: Any, topic: str, events: Any) -> Future:
+    def _submit(self, function: Any, place: int, task: Any, topic: str, events: Any, threads: int) -> Future:
         # As a producer of data it waits at the scheduler. What waits at a worker is suspected when that dies.
         more: dict[str, Any] = {"_data_producer": True}
         key = f"{topic}-{place}"
-        call = (_run, function, task, place, topic, self._every)
+        call = (_run, function, task, place, topic, max(NEWS_S, threads / MOST_NEWS))
         future = self.client.submit(*call, pure=False, key=key, **more)
         future.add_done_callback(events.put)
         return future
 
-    def _ahead(self) -> int:
+    def _threads(self) -> int:
         try:
-            threads = self.client.nthreads()
+            return sum(self.client.nthreads().values())
         except (OSError, ClosedClientError) as error:
             raise _lost(str(error)) from error
-        count = sum(threads.values())
-        self._every = max(NEWS_S, count / MOST_NEWS)
-        return max(_LEAST_AHEAD, _AHEAD * count)
 
     def _check(self) -> None:
         """Raise InputError if the scheduler has been out of reach for too long."""

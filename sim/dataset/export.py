@@ -14,7 +14,9 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.parts import MovingPart, Part, RemeshedPart, sample_parts
 from muslin.sim.dataset.pc2 import write_pc2
-from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.reader import Dataset
+from muslin.sim.dataset.root import Root
+from muslin.sim.dataset.selection import select
 from muslin.sim.dataset.usd import write_usd
 
 Writer = Callable[[Path], None]
@@ -23,7 +25,7 @@ FORMATS = ("obj", "ply", "glb", "usd", "pc2", "npz")
 
 
 def export_dataset(
-    path: str | Path,
+    path: Dataset | str | Path | Root,
     out: str | Path,
     file_format: str,
     *,
@@ -35,14 +37,12 @@ def export_dataset(
 
     Raises InputError for an unknown format or id, and if a file would be overwritten.
     """
-    dataset = open_dataset(path)
-    wanted = list(dataset.ids if ids is None else ids)
+    chosen = select(path, ids=ids)
     written: list[Path] = []
-    for done, sample_id in enumerate(wanted, start=1):
-        sample = dataset[sample_id]
-        written += export_parts(sample_id, sample_parts(sample, body), sample.fps, out, file_format)
+    for done, sample in enumerate(chosen, start=1):
+        written += export_parts(sample.id, sample_parts(sample, body), sample.fps, out, file_format)
         if progress is not None:
-            progress(done, len(wanted), sample_id)
+            progress(done, len(chosen), sample.id)
     return written
 
 

@@ -18,7 +18,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import store
 from muslin.sim.dataset.cloth_arrays import VERTICES
 from muslin.sim.dataset.codecs import numcodecs_unremarked
-from muslin.sim.dataset.root import Root, StoreError
+from muslin.sim.dataset.root import Root
 
 OPEN_SAMPLES = 2048
 """How many samples are kept open for the next frame."""
@@ -37,12 +37,8 @@ def read_frame(root: Root, sample_id: str, frame: int) -> NDArray[np.float32]:
         )
     rows = opened.rows(frame % opened.frames)
     path = f"{store.sample_place(root, sample_id)}/positions"
-    try:
+    with store.damage_told(path, f"frame {frame} is not readable"):
         positions = np.asarray(opened.array[rows])
-    except StoreError:
-        raise
-    except store.UNREADABLE as error:
-        raise InputError(f"{path}: frame {frame} is not readable ({error}); {store.REMEDY}") from error
     if not np.isfinite(positions).all():
         raise InputError(f"{path}: part of frame {frame} is missing; {store.REMEDY}")
     return positions
@@ -64,23 +60,16 @@ class _Opened:
 def _open(root: Root, sample_id: str, stamp: Hashable) -> _Opened:
     group, place = store.open_sample(root, sample_id), store.sample_place(root, sample_id)
     meta, checksums = store.meta_of(group, place)
-    try:
+    with store.damage_told(f"{place}/zarr.json", "not the attributes of a sample"):
         frames, starts = int(meta["frames"]), None
         shape: tuple[int, ...] = (frames, int(meta["vertices"]), 3)
-    except store.UNREADABLE as error:
-        raise InputError(f"{place}/zarr.json: not the attributes of a sample; {store.REMEDY}") from error
     if "frame_topology" in checksums:
         sizes = store.read_array(root, sample_id, "topology_sizes")[:, VERTICES]
         counts = sizes[store.read_array(root, sample_id, "frame_topology")]
         starts = np.concatenate([[0], np.cumsum(counts)])
         shape = (int(starts[-1]), 3)
-    try:
-        with numcodecs_unremarked():
-            array = group["positions"]
-    except StoreError:
-        raise
-    except store.UNREADABLE as error:
-        raise InputError(f"{place}/positions/zarr.json: not readable ({error}); {store.REMEDY}") from error
+    with store.damage_told(f"{place}/positions/zarr.json"), numcodecs_unremarked():
+        array = group["positions"]
     if not isinstance(array, zarr.Array) or (array.shape, array.dtype) != (shape, np.float32):
         raise InputError(
             f"{place}/positions/zarr.json: {array.metadata.to_dict().get('data_type', 'no array')} of shape "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,12 +17,12 @@ from muslin.sim.dataset.card import write_card
 from muslin.sim.dataset.config import DatasetConfig
 from muslin.sim.dataset.engine import Cluster, Died, Done, Engine, News, open_engine
 from muslin.sim.dataset.header import Header, prepare_root
-from muslin.sim.dataset.index import read_index, read_row, stored_rows, write_index
+from muslin.sim.dataset.index import read_row, stored_rows, write_index
 from muslin.sim.dataset.jobs import Chain, Plan
 from muslin.sim.dataset.plan import plan
 from muslin.sim.dataset.progress import Progress, Tally
 from muslin.sim.dataset.quarantine import Quarantined, quarantine, quarantined_ids, release, state_name
-from muslin.sim.dataset.reader import open_dataset
+from muslin.sim.dataset.reader import Dataset
 from muslin.sim.dataset.root import Root, open_root
 from muslin.sim.dataset.schema import PICTURE
 from muslin.sim.dataset.solver import solver_digest
@@ -46,7 +47,6 @@ class GenerateReport:
     held         ids in quarantine since an earlier run, and those behind them in their chains: not tried
     aside        {id: place} of what was set aside to be made again
     card         False if README.md is not the dataset's card but somebody's own, and was left as it is
-    busy         seconds that workers were at it, in all
     """
 
     made: tuple[str, ...]
@@ -54,7 +54,6 @@ class GenerateReport:
     failed: dict[str, str] = field(default_factory=dict)
     held: tuple[str, ...] = ()
     seconds: float = 0.0
-    busy: float = 0.0
     aside: dict[str, str] = field(default_factory=dict)
     card: bool = True
 
@@ -96,7 +95,7 @@ def generate(
     """
     root = open_root(out)
     started = time.perf_counter()
-    where = cluster or Cluster(workers=1 if workers is None and device != "cpu" else workers)
+    where = cluster or Cluster(workers=workers)
     planned = plan(config)
     strangers = sorted(set(again) - planned.splits.keys())
     if strangers:
@@ -124,30 +123,30 @@ def generate(
         release(root, [sample_id for sample_id in sorted(held) if retry or sample_id in again])
         held = frozenset() if retry else held - set(again)
         tasks = [
-            Task(root, chain, missing, header.versions, solver, device, simulate, make_scene)
+            Task(root, chain, wanted, header.versions, solver, device, simulate, make_scene)
             for chain in planned.chains
-            if any(job.id in missing for job in chain.jobs)
+            if (wanted := missing.intersection(job.id for job in chain.jobs))
         ]
-        todo = [task for task in tasks if held.isdisjoint(job.id for job in task.wanted)]
+        ready = [task for task in tasks if held.isdisjoint(task.missing)]
         known = {row_id: row for row_id, row in _known_rows(root).items() if row_id in there}
-        run = _Run(root, header, known, Tally(root, sum(len(task.wanted) for task in todo), progress))
-        if todo:
-            run.over(where, todo)
+        run = _Run(root, header, known, Tally(root, sum(len(task.missing) for task in ready), progress))
+        if ready:
+            run.over(where, ready)
         root.clean()
-        write_index(root, header, run.rows)
-        if picture and (run.made or not root.exists(PICTURE)):
-            _draw(root, run.tally)
+        rows = write_index(root, header, run.rows)
+        made = missing.intersection(run.rows)
+        if picture and (made or not root.exists(PICTURE)):
+            _draw(Dataset(root, header, rows), run.tally)
         run.tally.end("finished")
-        card = write_card(root, header, read_index(root, header), planned.jobs)
+        card = write_card(root, header, rows, planned.jobs)
     order = [job.id for job in planned.jobs]
-    skipped = {job.id for task in tasks if task not in todo for job in task.wanted}
+    skipped = set().union(*(task.missing for task in tasks if not held.isdisjoint(task.missing)))
     return GenerateReport(
-        made=tuple(i for i in order if i in missing and i in run.rows),
+        made=tuple(i for i in order if i in made),
         kept=tuple(i for i in order if i in there),
         failed=run.failed,
         held=tuple(i for i in order if i in skipped),
         seconds=time.perf_counter() - started,
-        busy=run.busy,
         aside={sample_id: place for sample_id, place in places.items() if place is not None},
         card=card,
     )
@@ -159,22 +158,18 @@ class _Run:
     def __init__(self, root: Root, header: Header, rows: Mapping[str, dict[str, Any]], tally: Tally) -> None:
         self.root, self.header, self.tally = root, header, tally
         self.rows = dict(rows)
-        self.made = 0
         self.failed: dict[str, str] = {}
-        self.busy = 0.0
 
-    def over(self, cluster: Cluster, todo: Sequence[Task]) -> None:
-        if cluster.scheduler is None and any(task.simulate is None for task in todo):
+    def over(self, cluster: Cluster, tasks: Sequence[Task]) -> None:
+        if cluster.scheduler is None and any(task.simulate is None for task in tasks):
             self.tally.stage("compiling kernels")
             from muslin.sim.compile import compile_once
 
-            compile_once(todo[0].device)
+            compile_once(tasks[0].device)
         # Sequences first: a long one begun last would leave the other cores idle.
-        order = sorted(todo, key=lambda task: task.chain.jobs[0].kind != "sequence")
+        order = sorted(tasks, key=lambda task: task.chain.jobs[0].kind != "sequence")
         self.tally.stage("starting workers")
-        if cluster.scheduler is None and cluster.workers is not None:
-            cluster = replace(cluster, workers=min(cluster.workers, len(order)))
-        with open_engine(cluster) as engine:
+        with open_engine(cluster.fitted(len(order), order[0].device)) as engine:
             self.tally.open(engine.dashboard)
             self._follow(engine, order)
 
@@ -214,11 +209,9 @@ class _Run:
                 self._fail(task, rest, rest[0], found.reason, found.log)
             self.tally.finished(place, len(wanted) - len(rest), len(rest))
             return
-        self.busy += found.seconds
         if found.store:
             raise OSError(found.store)
         self.rows |= {row["id"]: row for row in found.rows}
-        self.made += len(found.rows)
         rest = wanted[len(found.rows) :]
         if found.failed:
             self._fail(task, rest, found.failed, found.reason, found.log)
@@ -234,13 +227,12 @@ class _Run:
             self.failed[behind] = f"{BEHIND}{sample_id} in its chain"
 
 
-def _draw(root: Root, tally: Tally) -> None:
+def _draw(dataset: Dataset, tally: Tally) -> None:
     from muslin.sim.view.overview import overview
 
-    dataset = open_dataset(root)
     if len(dataset):
         tally.stage("drawing")
-        root.write(PICTURE, overview(dataset))
+        dataset.root.write(PICTURE, overview(dataset))
 
 
 @contextlib.contextmanager
@@ -264,7 +256,7 @@ def _entry(
         id=sample_id,
         reason=reason.splitlines()[0],
         log=log,
-        command=f"muslin repair {root} --sample {sample_id} --workers 1",
+        command=shlex.join(["muslin", "repair", str(root), "--sample", sample_id, "--workers", "1"]),
         seed=chain.jobs[place].seed,
         scenes=tuple(job.scene for job in chain.jobs[: place + 1]),
         state=root.place(state) if root.exists(state) else "",

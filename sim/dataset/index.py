@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pyarrow as pa
@@ -88,39 +88,44 @@ def row_of(meta: Mapping[str, Any], checksums: Mapping[str, str], size: int) -> 
     return values | {key: certificate[key] for key in _FROM_CERTIFICATE}
 
 
-def write_index(root: Root, header: Header, known: Mapping[str, Mapping[str, Any]] | None = None) -> None:
-    """Write the rows of all samples that are there, in plan order, replacing the index in one step.
+def write_index(
+    root: Root, header: Header, known: Mapping[str, dict[str, Any]] | None = None
+) -> tuple[dict[str, Any], ...]:
+    """Write the rows of all samples that are there, in plan order, replacing the index in one step; return
+    them.
 
     known   {id: row} of samples that need not be read
     """
     ids = in_plan_order(header, store.stored_ids(root))
-    have = known or {}
-    rows = [have[sample_id] if sample_id in have else read_row(root, sample_id) for sample_id in ids]
+    rows = _rows(root, header, ids, known or {})
     remeshed = any(entry["topologies"] > 1 for entry in rows)
-    rows = [{**entry, "split": header.splits.get(entry["id"], "")} for entry in rows]
     table = pa.Table.from_pylist(rows, schema=COLUMNS.append(TOPOLOGIES) if remeshed else COLUMNS)
     sink = io.BytesIO()
     pq.write_table(table, sink)
     root.write(INDEX, sink.getvalue())
+    return rows
 
 
-def read_index(root: Root, header: Header) -> list[dict[str, Any]]:
+def read_index(root: Root, header: Header) -> tuple[dict[str, Any], ...]:
     """Rows of all samples, in plan order.
 
     Rows that the index lacks (a run was killed before it wrote them) are read from the samples; a row whose
     sample is gone is kept, so that the loss is seen. Raises InputError if the index or a sample is damaged.
     """
-    rows = stored_rows(root)
-    ids = in_plan_order(header, {*rows, *store.stored_ids(root)})
-    found = [rows[sample_id] if sample_id in rows else read_row(root, sample_id) for sample_id in ids]
-    return [entry | {"split": header.splits.get(entry["id"], "")} for entry in found]
+    known = stored_rows(root)
+    ids = in_plan_order(header, {*known, *store.stored_ids(root)})
+    return _rows(root, header, ids, known)
 
 
-def stored_rows(root: Root, but: Collection[str] = ()) -> dict[str, dict[str, Any]]:
-    """{id: row} of the index file, without those of `but`; empty without a file.
+def _rows(
+    root: Root, header: Header, ids: Iterable[str], known: Mapping[str, dict[str, Any]]
+) -> tuple[dict[str, Any], ...]:
+    found = (known[sample_id] if sample_id in known else read_row(root, sample_id) for sample_id in ids)
+    return tuple(entry | {"split": header.splits.get(entry["id"], "")} for entry in found)
 
-    Raises InputError if it is damaged.
-    """
+
+def stored_rows(root: Root) -> dict[str, dict[str, Any]]:
+    """{id: row} of the index file; empty without a file. Raises InputError if it is damaged."""
     try:
         data = root.read(INDEX)
     except FileNotFoundError:
@@ -133,7 +138,7 @@ def stored_rows(root: Root, but: Collection[str] = ()) -> dict[str, dict[str, An
     if table.schema.names not in (COLUMNS.names, COLUMNS.append(TOPOLOGIES).names):
         raise InputError(f"{path}: columns are not those of an index; {_REBUILD}")
     rows = ({TOPOLOGIES.name: 1} | entry for entry in table.to_pylist())
-    return {entry["id"]: entry for entry in rows if entry["id"] not in but}
+    return {entry["id"]: entry for entry in rows}
 
 
 _REBUILD = "delete it, it is rebuilt from the samples"

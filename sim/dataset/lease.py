@@ -62,9 +62,8 @@ class _Lease:
         self.lost = False
 
     def take(self, beat: float, dead: float) -> None:
-        if (
-            self.root.create(self.name, self._content()) or self._mine()
-        ):  # created, if only its answer was lost
+        # It may be created already, where only the store's answer was lost.
+        if self.root.create(self.name, self._content()) or self._mine():
             return
         before, since = self._seen(), time.monotonic()
         while time.monotonic() - since < dead:

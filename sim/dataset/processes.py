@@ -7,6 +7,7 @@ import multiprocessing.process
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -50,6 +51,10 @@ def worker_died(workers: int, note: str = "") -> InputError:
     )
 
 
+def _each(run: Callable[[Work], Found], part: Sequence[Work]) -> list[Found]:
+    return [run(task) for task in part]
+
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
@@ -91,9 +96,14 @@ def in_processes(
         one_thread_each(),
         ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(start,)) as pool,
     ):
+        parts = [tasks[first : first + chunk] for first in range(0, len(tasks), chunk)]
         try:
-            yield from pool.map(run, tasks, chunksize=chunk)
+            waiting = deque(pool.submit(_each, run, part) for part in parts)
+            while waiting:
+                yield from waiting.popleft().result()
         except BrokenProcessPool as error:
+            # Not `pool.map`, which cancels what is left while the pool tells the same futures that it is
+            # broken: its thread may die of that (Python 3.11), and then nothing ends.
             raise worker_died(workers) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

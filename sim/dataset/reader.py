@@ -61,7 +61,7 @@ class Dataset:
 
     def __getitem__(self, key: str | int) -> Sample:
         """A sample by id or by place. Raises InputError for an unknown id and for a damaged sample."""
-        sample_id = self._id(key)
+        sample_id = self.check_id(key)
         sample = store.read_sample(self.root, sample_id)
         return replace(sample, labels=sample.labels | {"split": self.header.splits.get(sample_id, "")})
 
@@ -70,9 +70,10 @@ class Dataset:
 
         Raises InputError for an unknown id, a frame that is not there, and for damage to what was read.
         """
-        return read_frame(self.root, self._id(key), frame)
+        return read_frame(self.root, self.check_id(key), frame)
 
-    def _id(self, key: str | int) -> str:
+    def check_id(self, key: str | int) -> str:
+        """The id of a sample, by id or by place. Raises InputError for an unknown id."""
         sample_id = self.ids[key] if isinstance(key, int) else key
         if sample_id not in self:
             near = get_close_matches(sample_id, self.ids, n=3, cutoff=0.4) or self.ids[:3]
@@ -98,7 +99,7 @@ def open_dataset(path: str | Path | Root) -> Dataset:
     """
     root = open_root(path)
     header = read_header(root)
-    return Dataset(root, header, tuple(read_index(root, header)))
+    return Dataset(root, header, read_index(root, header))
 
 
 def write_dataset(

@@ -9,10 +9,11 @@ from typing import Any
 
 from muslin.garments.errors import InputError
 from muslin.sim.dataset.reader import Dataset, open_dataset
+from muslin.sim.dataset.root import Root
 
 
 def select(
-    dataset: Dataset | str | Path,
+    dataset: Dataset | str | Path | Root,
     split: str | None = None,
     where: Mapping[str, Any] | None = None,
     ids: Iterable[str] | None = None,
@@ -30,28 +31,24 @@ def select(
     if not len(chosen):
         raise InputError(f"{chosen.root}: the dataset holds no sample; run `muslin generate` first")
     if ids is not None:
-        chosen = replace(chosen, rows=tuple(_row(chosen, sample_id) for sample_id in dict.fromkeys(ids)))
+        rows = {row["id"]: row for row in chosen.rows}
+        asked = [chosen.check_id(sample_id) for sample_id in dict.fromkeys(ids)]
+        chosen = replace(chosen, rows=tuple(rows[sample_id] for sample_id in asked))
     if split is not None:
         chosen = chosen.split(split)
     columns = sorted(chosen.rows[0]) if len(chosen) else []
     for key, value in (where or {}).items():
         if key not in columns:
             raise InputError(f"{chosen.root}: samples have no {key!r}; they have {', '.join(columns)}")
-        rows = tuple(row for row in chosen.rows if _equal(row[key], value))
-        if not rows:
+        found = tuple(row for row in chosen.rows if _equal(row[key], value))
+        if not found:
             there = list(dict.fromkeys(str(row[key]) for row in chosen.rows))
             raise InputError(
                 f"{chosen.root}: no sample has {key}={value}; there is {', '.join(there[:6])}"
                 + (" …" if len(there) > 6 else "")
             )
-        chosen = replace(chosen, rows=rows)
+        chosen = replace(chosen, rows=found)
     return chosen
-
-
-def _row(dataset: Dataset, sample_id: str) -> dict[str, Any]:
-    if sample_id not in dataset:
-        dataset.frame(sample_id, 0)  # raises the error that tells which ids are near
-    return dataset.rows[dataset.ids.index(sample_id)]
 
 
 def _equal(stored: Any, asked: Any) -> bool:

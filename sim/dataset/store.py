@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,20 @@ UNREADABLE = (
 )
 """What zarr and its codecs raise over damaged files."""
 REMEDY = "run `muslin repair` to make the sample again, or restore it from a copy"
+
+
+@contextmanager
+def damage_told(place: str, what: str = "not readable") -> Iterator[None]:
+    """Tell of damage that is found in the block, to what lies at `place`, as an InputError.
+
+    A store that is out of reach is no damage: its StoreError passes.
+    """
+    try:
+        yield
+    except StoreError:
+        raise
+    except UNREADABLE as error:
+        raise InputError(f"{place}: {what} ({error}); {REMEDY}") from error
 
 
 def sample_name(sample_id: str) -> str:
@@ -102,20 +117,15 @@ def sample_place(root: Root, sample_id: str) -> str:
 def open_sample(root: Root, sample_id: str) -> zarr.Group:
     """The zarr group of a sample, to be read. Raises InputError if it is missing or no such group."""
     place = sample_place(root, sample_id)
-    try:
-        store = PackedStore(root, sample_name(sample_id))
-    except FileNotFoundError as error:
-        raise InputError(f"{place}: the sample is missing; run `muslin generate` again to make it") from error
-    except StoreError:
-        raise
-    except (OSError, ValueError) as error:
-        raise InputError(f"{place}: not readable ({error}); {REMEDY}") from error
-    try:
+    with damage_told(place):
+        try:
+            store = PackedStore(root, sample_name(sample_id))
+        except FileNotFoundError as error:
+            raise InputError(
+                f"{place}: the sample is missing; run `muslin generate` again to make it"
+            ) from error
+    with damage_told(f"{place}/zarr.json"):
         return zarr.open_group(store, mode="r", zarr_format=3)
-    except StoreError:
-        raise
-    except UNREADABLE as error:
-        raise InputError(f"{place}/zarr.json: not readable ({error}); {REMEDY}") from error
 
 
 def meta_of(group: zarr.Group, place: str) -> tuple[dict[str, Any], dict[str, str]]:
@@ -246,13 +256,8 @@ def _assemble(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Sample:
 
 
 def _read_array(group: zarr.Group, place: str, name: str, checksum: str) -> np.ndarray:
-    try:
-        with numcodecs_unremarked():
-            array = np.asarray(group[name][...])  # type: ignore[index]
-    except StoreError:
-        raise
-    except UNREADABLE as error:
-        raise InputError(f"{place}/{name}: not readable ({error}); {REMEDY}") from error
+    with damage_told(f"{place}/{name}"), numcodecs_unremarked():
+        array = np.asarray(group[name][...])  # type: ignore[index]
     if _sha256(array) != checksum:
         raise InputError(f"{place}/{name}: bytes do not match their sha256; {REMEDY}")
     return array

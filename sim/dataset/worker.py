@@ -30,7 +30,7 @@ process."""
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker needs to make the missing samples of a chain."""
+    """What a worker needs to make the missing samples of a chain. missing: ids of these."""
 
     root: Root
     chain: Chain
@@ -54,7 +54,6 @@ class Made:
     rows     index rows of the samples that were made
     failed   id of the sample at which the chain ended, with the reason and what a developer needs; or empty
     store    why the store could not be written to, which is not the sample's fault; or empty
-    seconds  that the worker was at it
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -62,12 +61,10 @@ class Made:
     reason: str = ""
     log: tuple[str, ...] = ()
     store: str = ""
-    seconds: float = 0.0
 
 
 def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
     """Make the missing samples of a chain; tell [share of its work that is done, id of what it is at]."""
-    begun = time.perf_counter()
     left = task.wanted
     rows: list[dict[str, Any]] = []
 
@@ -85,7 +82,7 @@ def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
                     rows.append(_commit(task.root, _named(job, sample, task, seconds)))
                 except OSError as error:  # a full disk, or a store out of reach
                     why = f"{type(error).__name__}: {error}"
-                    return Made(rows, store=why, seconds=time.perf_counter() - begun)
+                    return Made(rows, store=why)
                 left.remove(job)
             if not left:
                 break
@@ -97,10 +94,10 @@ def make_chain(task: Task, tell: Callable[[Any], None]) -> Made:
                 reason += f"; the last good state is in {_keep(task.root, left[0].id, error.state)}"
             except OSError as unwritable:
                 why = f"{type(unwritable).__name__}: {unwritable}"
-                return Made(rows, store=why, seconds=time.perf_counter() - begun)
+                return Made(rows, store=why)
         log = tuple(traceback.format_exc().splitlines())
-        return Made(rows, left[0].id, reason, log, seconds=time.perf_counter() - begun)
-    return Made(rows, seconds=time.perf_counter() - begun)
+        return Made(rows, left[0].id, reason, log)
+    return Made(rows)
 
 
 def _prepared(task: Task) -> tuple[ChainSimulator, list[Any]]:

@@ -14,7 +14,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from muslin.garments.errors import InputError
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.layouts.catalogue import LAYOUTS
 from muslin.sim.dataset.layouts.layout import Layout
-from muslin.sim.dataset.layouts.sources import sources_of
+from muslin.sim.dataset.licences import Source, sources_of
 from muslin.sim.dataset.reader import Dataset
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.dataset.selection import select
@@ -150,7 +150,7 @@ def _write_sample(sample: Sample, row: Mapping[str, Any], root: Path, form: Layo
         "garment_parameters": sample.garments[0].parameters,
         "body": row["body"] and Path(row["body"]).name,
         "certificate": sample.certificate.to_dict(),
-        "sources": sources_of(sample),
+        "sources": [asdict(source) for source in _sources(sample)],
         "files": len(files) + 1,
         "bytes": sum(file.stat().st_size for file in files),
     }
@@ -160,6 +160,10 @@ def _write_sample(sample: Sample, row: Mapping[str, Any], root: Path, form: Layo
     os.replace(partial, root / SAMPLES / sample.id)
     durable.sync(root / SAMPLES)
     (root / PARTIAL).rmdir()
+
+
+def _sources(sample: Sample) -> list[Source]:
+    return sources_of(sample.scene, sample.body.model if sample.body else None, sample.fabric)
 
 
 def _all_facts(root: Path, dataset: Dataset) -> list[dict[str, Any]]:

@@ -182,7 +182,7 @@ def test_index_and_summary_count_topologies(dataset: Dataset) -> None:
     folder = dataset.root.path
     (folder / INDEX).rename(folder / "kept")
     try:
-        assert read_index(dataset.root, dataset.header) == list(dataset.rows)
+        assert read_index(dataset.root, dataset.header) == dataset.rows
     finally:
         (folder / "kept").rename(folder / INDEX)
 
