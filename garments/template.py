@@ -50,3 +50,13 @@ def template(
         points.append(carry(cut.vertices_of(k), cut.faces_of(k), boundary))
         uv.append(atlas.place(cut.vertices_of(k), k))
     return cut.mesh(pattern, np.concatenate(points), np.concatenate(uv))
+
+
+def template_of(mesh: GarmentMesh) -> int | None:
+    """Resolution of the template that a mesh is, a key of EDGE_LENGTHS; None if it has other triangles."""
+    for resolution in EDGE_LENGTHS:
+        if abs(mesh.num_vertices - resolution) <= 0.02 * resolution and np.array_equal(
+            template(mesh.name, mesh.parameters, resolution).faces, mesh.faces
+        ):
+            return resolution
+    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from muslin.garments.errors import InputError
 from muslin.garments.locate import locate
 from muslin.garments.mesh import corner_angles, signed_areas
 from muslin.garments.pattern import Pattern
-from muslin.garments.template import EDGE_LENGTHS, template
+from muslin.garments.template import EDGE_LENGTHS, template, template_of
 from muslin.garments.topology import asset_path, digest, reference, topology
 from muslin.garments.triangulate import triangulate
 from muslin.garments.uv_layout import BACKGROUND, BACKGROUND_EDGE_LENGTH, interpolate
@@ -50,6 +51,14 @@ def test_every_member_has_the_same_connectivity_and_uv(resolution: int) -> None:
         pattern = TEE.pattern(**parameters)
         edge_length = EDGE_LENGTHS[resolution]
         assert member.face_areas.sum() == pytest.approx(pattern.area, rel=16.0 * edge_length**2)
+
+
+@pytest.mark.parametrize("resolution", [403, 1400, 4000])
+def test_a_template_is_known_by_its_triangles(resolution: int) -> None:
+    mesh = template("tee", {"garment_length": 0.9}, resolution)
+    assert template_of(mesh) == resolution
+    turned = replace(mesh, faces=mesh.faces[::-1].copy(), panel_faces=mesh.panel_faces[::-1].copy())
+    assert template_of(turned) is None
 
 
 def test_reference_member_is_not_distorted() -> None:
