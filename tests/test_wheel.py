@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("garments", "sim", "learn", "eval")
 BUILD_FILES = ("pyproject.toml", "setup.py", "README.md", "LICENSE", "NOTICE")
 # Libraries that only some modules need: those of extras, and of the scripts that baked the committed data.
-OPTIONAL = ("torch", "anny")
+OPTIONAL = ("torch", "accelerate", "safetensors", "anny")
 
 IMPORT_ALL = """
 import importlib, json, sys
