@@ -1,0 +1,1 @@
+"""Graph operators on garment meshes: convolution, pooling, and the network made of them."""
