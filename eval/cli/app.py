@@ -16,11 +16,13 @@ from muslin.eval.cli.export import export
 from muslin.eval.cli.generate import generate
 from muslin.eval.cli.info import info
 from muslin.eval.cli.pattern import pattern
+from muslin.eval.cli.predict import predict
 from muslin.eval.cli.remesh import remesh
 from muslin.eval.cli.render import render
 from muslin.eval.cli.repair import repair
 from muslin.eval.cli.report import report
 from muslin.eval.cli.simulate import simulate
+from muslin.eval.cli.train import train
 from muslin.eval.cli.validate import validate
 from muslin.eval.cli.verify import verify
 from muslin.eval.cli.view import view
@@ -89,6 +91,7 @@ for name, command, summary in (
     ("verify", verify, "Count all intersections of a dataset again."),
     ("repair", repair, "Make again what is damaged or missing in a dataset."),
     ("info", info, "What a dataset holds."),
+    ("predict", predict, "Learned drapes, of one garment or a dataset."),
     ("eval", evaluate, "Score a prediction against the truth."),
     ("bench", bench, "Methods against each other by a protocol."),
     ("report", report, "A dataset as one HTML page."),
@@ -100,6 +103,7 @@ for name, command, summary in (
     ("view", view, "Look at a sample in a window."),
 ):
     app.command(name, short_help=summary)(command)
+app.add_typer(train, name="train", short_help="Networks from a dataset.")
 
 
 def main() -> None:

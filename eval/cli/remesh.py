@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from muslin.sim.remesh.settings import RemeshSettings
     from muslin.sim.remesh.topology import Remeshed
 
-MAX_DISTORTION = 2.5  # that of `muslin.sim.remesh.distortion`, which loads scipy
 MOST_TOPOLOGIES = 10_000
 
 
@@ -37,9 +36,11 @@ def remesh(
         typer.Option("--panel-area", metavar="NAME=A", help="Another one for this panel. Repeatable."),
     ] = None,
     max_distortion: Annotated[
-        float,
-        typer.Option("--max-distortion", metavar="D", help="Of any triangle; 1 is equilateral."),
-    ] = MAX_DISTORTION,
+        float | None,
+        typer.Option(
+            "--max-distortion", metavar="D", help="Of any triangle; 1 is equilateral, by default 2.5."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, metavar="S", help="Another one, another mesh.")] = 0,
     topologies: Annotated[
         int,
@@ -191,18 +192,20 @@ def _drawn(
     given: RemeshSource,
     target: float | dict[str, float] | NDArray[np.float64],
     seed: int,
-    max_distortion: float,
+    max_distortion: float | None,
     interpolate: bool,
 ) -> Drawn:
     import numpy as np
 
     from muslin.sim.remesh import topology
+    from muslin.sim.remesh.distortion import MAX_DISTORTION
     from muslin.sim.remesh.fit import fit
     from muslin.sim.remesh.untangle import untangle
 
     flat = given.positions is None
     positions = np.zeros((given.mesh.num_vertices, 3)) if given.positions is None else given.positions
-    made = topology.remesh(given.mesh, positions, target, seed=seed, max_distortion=max_distortion)
+    allowed = MAX_DISTORTION if max_distortion is None else max_distortion
+    made = topology.remesh(given.mesh, positions, target, seed=seed, max_distortion=allowed)
     if flat:
         return Drawn(made, np.zeros(made.mesh.num_vertices))
     if not interpolate:

@@ -1,0 +1,84 @@
+"""`muslin predict`: learned drapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from muslin.eval.cli.options import Force, check_new
+from muslin.garments.errors import InputError
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(metavar="MODEL_DIR", help="What `muslin train` wrote.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="FILE.obj, or a new folder with --dataset.")
+    ],
+    design: Annotated[
+        list[str] | None,
+        typer.Option("--design", metavar="KEY=METRES", help="A design parameter. Repeatable."),
+    ] = None,
+    beta: Annotated[
+        list[float] | None, typer.Option("--beta", help="Body shape, standard deviations. Repeatable.")
+    ] = None,
+    fabric: Annotated[str | None, typer.Option("--fabric", help="By default the first it knows.")] = None,
+    target_area: Annotated[
+        float | None,
+        typer.Option("--target-area", metavar="A", help="Mean triangle area, m²; else the 4,000 template."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="With --target-area: another one, another mesh.")
+    ] = 0,
+    dataset: Annotated[
+        str | None, typer.Option("--dataset", metavar="DIR", help="Predict all samples of a dataset instead.")
+    ] = None,
+    split: Annotated[str | None, typer.Option("--split", metavar="NAME", help="Of the dataset.")] = None,
+    force: Force = False,
+) -> None:
+    """Drape a garment by trained networks, or all garments of a dataset, as a dataset to be scored.
+
+    \b
+    Examples:
+      muslin predict out/pipeline --design sleeve_length=0.3 --beta 1.5 --out tee.obj
+      muslin predict out/pipeline --dataset out/thesis_static --split test-designs --out out/predicted
+    """
+    given = dict(_parameter(entry) for entry in design or [])
+    if dataset is not None and (given or beta or fabric or target_area):
+        raise InputError("--dataset says garments, shapes and fabrics itself; leave out the other options")
+    if dataset is None:
+        if out.suffix.lower() != ".obj":
+            raise InputError(f"{out}: a garment is written as .obj, not {out.suffix!r}")
+        check_new(out, force)
+
+    from muslin.learn.drape.predict import garment_of, load_draper, predict_dataset, predict_one
+    from muslin.learn.training.machine import use_all_cores
+
+    use_all_cores()
+    draper = load_draper(model)
+    if dataset is not None:
+        from muslin.eval.cli.progress import progress_bar
+        from muslin.sim.dataset.selection import select
+
+        with progress_bar("predict") as update:
+            made = predict_dataset(draper, select(dataset, split), out, progress=update)
+        typer.echo(f"{out}: {len(made)} samples")
+        return
+
+    from muslin.garments.obj import write_garment
+
+    mesh = garment_of(draper.world.design, given, target_area, seed)
+    sample = predict_one(draper, mesh, beta or [0.0], fabric or draper.world.fabrics[0])
+    write_garment(mesh, out, sample.positions[0].astype("float64"))
+    typer.echo(f"{out}: {sample.num_vertices} vertices, {sample.fabric}")
+
+
+def _parameter(entry: str) -> tuple[str, float]:
+    name, separator, value = entry.partition("=")
+    try:
+        if not separator or not name:
+            raise ValueError
+        return name, float(value)
+    except ValueError as error:
+        raise InputError(f"--design {entry!r}: must be KEY=METRES, e.g. sleeve_length=0.3") from error

@@ -1,0 +1,1 @@
+"""Static drapes: the pipeline of graph networks, its baselines and what trains them."""
