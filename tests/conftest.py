@@ -1,4 +1,4 @@
-"""One thread a process, no display, the same random examples every run; `gpu` tests only with one."""
+"""One thread a process, no display, no waiting for disks, the same random examples; `gpu` tests with one."""
 
 import os
 
@@ -7,6 +7,8 @@ for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_variable] = "1"
 os.environ["MPLBACKEND"] = "Agg"
 os.environ["PYVISTA_OFF_SCREEN"] = "true"
+# Thousands of files are made here that no power failure need survive, and other machines share the disk.
+os.environ.setdefault("MUSLIN_NO_SYNC", "1")
 
 import pytest
 from hypothesis import settings

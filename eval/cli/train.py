@@ -26,20 +26,26 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Of weights and batches
 Precision = Annotated[str, typer.Option("--precision", help="no (float32) or bf16 (mixed).")]
 
 
+Epochs = Annotated[int, typer.Option("--epochs", min=1, help="Of each network.")]
+FabricInput = Annotated[
+    bool, typer.Option("--fabric-input", help="One R_fine that sees the fabric, not one a fabric.")
+]
+Order = Annotated[int, typer.Option("--order", min=1, help="K of the Chebyshev polynomials.")]
+Skinned = Annotated[
+    bool, typer.Option("--skinned", help="Start from the mean drape carried along by the skin.")
+]
+
+
 @train.command()
 def drape(
     dataset: DrapesOf,
     out: Out,
-    epochs: Annotated[int, typer.Option("--epochs", min=1, help="Of R_smooth and of each R_fine.")] = 60,
+    epochs: Epochs = 60,
     batch: Batch = 8,
     learning_rate: Rate = 3e-3,
-    order: Annotated[int, typer.Option("--order", min=1, help="K of the Chebyshev polynomials.")] = 3,
-    fabric_input: Annotated[
-        bool, typer.Option("--fabric-input", help="One R_fine that sees the fabric, not one a fabric.")
-    ] = False,
-    skinned: Annotated[
-        bool, typer.Option("--skinned", help="Start from the mean drape carried along by the skin.")
-    ] = False,
+    order: Order = 3,
+    fabric_input: FabricInput = False,
+    skinned: Skinned = False,
     precision: Precision = "no",
     seed: Seed = 0,
 ) -> None:
@@ -52,22 +58,71 @@ def drape(
       muslin train drape --dataset out/thesis_static --out out/pipeline
       muslin train drape --dataset out/thesis_static --out out/one_for_all --fabric-input
     """
-    from dataclasses import replace
-
     from muslin.learn.drape.train import DrapeSettings, train_pipeline
     from muslin.sim.dataset.reader import open_dataset
 
     each = _settings(epochs, learning_rate, precision, seed)
-    settings = replace(
-        DrapeSettings(smooth=each, fine=each),
-        batch=batch,
-        order=order,
-        fabric_input=fabric_input,
-        skinned=skinned,
-    )
+    settings = DrapeSettings(each, each, order=order, batch=batch, fabric_input=fabric_input, skinned=skinned)
     with _stages() as stage:
         pipeline = train_pipeline(open_dataset(dataset), out, settings, stage)
     _tell(out, [pipeline.smooth, *pipeline.fine.values()])
+
+
+@train.command()
+def smooth(
+    dataset: DrapesOf,
+    out: Out,
+    epochs: Epochs = 60,
+    batch: Batch = 8,
+    learning_rate: Rate = 3e-3,
+    order: Order = 3,
+    skinned: Skinned = False,
+    precision: Precision = "no",
+    seed: Seed = 0,
+) -> None:
+    """Train the first stages of `muslin train drape` alone: R_mean and R_smooth.
+
+    \b
+    Examples:
+      muslin train smooth --dataset out/thesis_static --out out/pipeline --epochs 120
+    """
+    from muslin.learn.drape.train import DrapeSettings, read_splits, train_smooth
+    from muslin.sim.dataset.reader import open_dataset
+
+    each = _settings(epochs, learning_rate, precision, seed)
+    settings = DrapeSettings(each, order=order, batch=batch, skinned=skinned)
+    with _stages() as stage:
+        pipeline = train_smooth(read_splits(open_dataset(dataset)), out, settings, stage)
+    _tell(out, [pipeline.smooth])
+
+
+@train.command()
+def fine(
+    dataset: DrapesOf,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="What `muslin train smooth` wrote.")],
+    epochs: Epochs = 60,
+    batch: Batch = 8,
+    learning_rate: Rate = 3e-3,
+    fabric_input: FabricInput = False,
+    precision: Precision = "no",
+    seed: Seed = 0,
+) -> None:
+    """Train the last stage of `muslin train drape` alone: R_fine, on what R_smooth says.
+
+    \b
+    Examples:
+      muslin train fine --dataset out/thesis_static --out out/pipeline --epochs 40
+    """
+    from muslin.learn.drape.pipeline import GRAPHS, load_pipeline
+    from muslin.learn.drape.train import DrapeSettings, read_splits, train_fine
+    from muslin.sim.dataset.reader import open_dataset
+
+    each = _settings(epochs, learning_rate, precision, seed)
+    settings = DrapeSettings(fine=each, batch=batch, fabric_input=fabric_input)
+    pipeline = load_pipeline(out, out / GRAPHS)
+    with _stages() as stage:
+        pipeline = train_fine(pipeline, read_splits(open_dataset(dataset)), out, settings, stage)
+    _tell(out, [*pipeline.fine.values()])
 
 
 @train.command()
@@ -75,7 +130,7 @@ def collisions(
     model: Annotated[Path, typer.Argument(metavar="MODEL_DIR", help="A pipeline of `muslin train drape`.")],
     dataset: DrapesOf,
     out: Out,
-    epochs: Annotated[int, typer.Option("--epochs", min=1, help="Of each R_fine.")] = 20,
+    epochs: Epochs = 20,
     loss: Annotated[
         str, typer.Option("--loss", metavar="KIND", help="distance (exact), or nearest-vertex (the thesis').")
     ] = "distance",
@@ -96,22 +151,19 @@ def collisions(
     Examples:
       muslin train collisions out/pipeline --dataset out/thesis_static --out out/tuned
     """
-    from muslin.learn.drape.examples import read_examples
     from muslin.learn.drape.fine_tune import FineTuning, fine_tune
     from muslin.learn.drape.pipeline import load_pipeline
-    from muslin.learn.drape.smoothing import LENGTH
+    from muslin.learn.drape.train import read_splits
     from muslin.sim.dataset.reader import open_dataset
 
     if loss not in ("distance", "nearest-vertex"):
         raise InputError(f"--loss {loss}: must be distance or nearest-vertex")
-    given = open_dataset(dataset)
-    others = [name for name in given.splits if name != "train"]
-    examples = read_examples(given.split("train"), LENGTH)
-    validation = {name: read_examples(given.split(name), LENGTH) for name in others}
+    sets = read_splits(open_dataset(dataset))
+    examples = sets.pop("train")
     settings = _settings(epochs, learning_rate, "no", seed)
     options = FineTuning(settings, loss, garments, batch=batch, anchor=anchor)  # type: ignore[arg-type]
     with _stages() as stage:
-        pipeline = fine_tune(load_pipeline(model), examples, out, options, validation, stage)
+        pipeline = fine_tune(load_pipeline(model), examples, out, options, sets, stage)
     _tell(out, [*pipeline.fine.values()])
 
 
@@ -119,7 +171,7 @@ def collisions(
 def fc(
     dataset: DrapesOf,
     out: Out,
-    epochs: Annotated[int, typer.Option("--epochs", min=1, help="Of each network.")] = 2000,
+    epochs: Epochs = 2000,
     batch: Batch = 16,
     learning_rate: Rate = 1e-3,
     precision: Precision = "no",
@@ -144,7 +196,7 @@ def ssch(
     dataset: DrapesOf,
     out: Out,
     design: Annotated[str, typer.Option("--design", metavar="NAME", help="The one design, by its label.")],
-    epochs: Annotated[int, typer.Option("--epochs", min=1, help="Of each network.")] = 2000,
+    epochs: Epochs = 2000,
     batch: Batch = 16,
     learning_rate: Rate = 1e-2,
     precision: Precision = "no",
@@ -159,13 +211,10 @@ def ssch(
     from muslin.learn.drape.fully_connected import train_single_garment
     from muslin.sim.dataset.selection import select
 
-    (own,) = {
-        tuple(sample.garment.parameters.items())
-        for sample in select(dataset, where={"design": design, "topology": "source"})
-    }
+    own = select(dataset, where={"design": design, "topology": "source"})[0].garment.parameters
     settings = _settings(epochs, learning_rate, precision, seed)
     with _stages() as stage:
-        draper = train_single_garment(_dense(dataset), dict(own), out, settings, batch, stage("ssch"))
+        draper = train_single_garment(_dense(dataset), own, out, settings, batch, stage("ssch"))
     _tell(out, list(draper.networks.values()))
 
 
@@ -181,12 +230,11 @@ def _dense(place: str) -> DenseDrapes:
     """The drapes of the split "train" that are on the template, or of all if there is no such split."""
     from muslin.learn.drape.dense import dense_drapes
     from muslin.learn.drape.examples import read_examples
-    from muslin.learn.drape.smoothing import LENGTH
     from muslin.sim.dataset.selection import select
 
     dataset = select(place, where={"topology": "source"})
     training = dataset.split("train") if "train" in dataset.splits else dataset
-    return dense_drapes(read_examples(training, LENGTH))
+    return dense_drapes(read_examples(training))
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What the networks learn from: the drapes of a dataset, smooth parts and what is left."""
+"""What the networks learn from: the drapes of a dataset."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -15,7 +14,6 @@ from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.template import template, template_of
 from muslin.learn.drape.mean import RESOLUTION
-from muslin.learn.drape.smoothing import Smoother
 from muslin.learn.drape.world import World, in_body_frame
 from muslin.sim.dataset.reader import Dataset
 from muslin.sim.dataset.sample import Sample
@@ -27,16 +25,19 @@ class Example:
 
     garment    place in `Examples.garments`
     beta       (n,) standard deviations
-    smooth     (V, 3) the target of R_smooth: smooth part of the drape averaged over fabrics, metres
-    drapes     {fabric: (V, 3)} as simulated, `in_body_frame`; R_fine learns `drapes[f] - smooth`
+    drapes     {fabric: (V, 3)} as simulated, `in_body_frame`, metres
     ids        {fabric: sample id}
     """
 
     garment: int
     beta: Tensor
-    smooth: Tensor
     drapes: dict[str, Tensor]
     ids: dict[str, str]
+
+    @property
+    def average(self) -> Tensor:
+        """(V, 3) over the fabrics."""
+        return torch.stack([*self.drapes.values()]).mean(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +59,15 @@ class Examples:
         return int(used.max()) + 1 if len(used) else 1
 
 
-def read_examples(dataset: Dataset, smoothing: float) -> Examples:
+def read_examples(dataset: Dataset) -> Examples:
     """The drapes of a dataset (or a part of it), grouped by garment and shape, each with all fabrics.
 
-    smoothing: length of `Smoother`, metres. Raises InputError for sequences, for cloth on no parametric body
-    or on different ones, and where a fabric is missing for some drape.
+    Raises InputError for sequences, for cloth on no parametric body or on different ones, and where a fabric
+    is missing for some drape.
     """
     fabrics = tuple(dict.fromkeys(row["fabric"] for row in dataset.rows))
     garments: dict[tuple[str, str], int] = {}
     meshes: list[GarmentMesh] = []
-    smoothers: list[Smoother] = []
     world: World | None = None
     examples = []
     for (design, topology, shape), rows in _groups(dataset.rows).items():
@@ -84,14 +84,11 @@ def read_examples(dataset: Dataset, smoothing: float) -> Examples:
         own = samples[fabrics[0]]
         if place == len(meshes):
             meshes.append(own.garment)
-            smoothers.append(Smoother(own.garment, smoothing))
         drapes = {fabric: torch.from_numpy(in_body_frame(s)) for fabric, s in samples.items()}
-        average = torch.stack([*drapes.values()]).mean(0)
-        smooth = torch.from_numpy(smoothers[place](average.numpy()).astype(np.float32))
         assert own.body is not None
         beta = torch.tensor(own.body.beta, dtype=torch.float32)
         ids = {fabric: sample.id for fabric, sample in samples.items()}
-        examples.append(Example(place, beta, smooth, drapes, ids))
+        examples.append(Example(place, beta, drapes, ids))
     if world is None:
         raise InputError(f"{dataset.root}: no drape is left to learn from")
     varied = [n for n, value in meshes[0].parameters.items() if any(m.parameters[n] != value for m in meshes)]
@@ -130,7 +127,7 @@ def mean_drapes(examples: Examples, resolution: int = RESOLUTION) -> tuple[Tenso
         own = [example for example in examples.examples if example.garment == place]
         off = [float(example.beta.norm()) for example in own]
         nearest = [e for e, distance in zip(own, off, strict=True) if distance <= min(off) + 1e-6]
-        average = torch.stack([x for example in nearest for x in example.drapes.values()]).mean(0)
+        average = torch.stack([example.average for example in nearest]).mean(0)
         coarse = template(mesh.name, mesh.parameters, resolution)
         drapes.append(torch.from_numpy(correspondence(mesh, coarse).carry(average.numpy())))
         parameters.append(torch.tensor([mesh.parameters[name] for name in examples.parameters]))

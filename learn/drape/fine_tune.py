@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,15 @@ from muslin.learn.drape.collisions import MARGIN, Kind, collision_loss
 from muslin.learn.drape.examples import Examples
 from muslin.learn.drape.fabric import fabric_figures, file_stem
 from muslin.learn.drape.garment import PreparedGarment
-from muslin.learn.drape.network import DrapeNetwork
 from muslin.learn.drape.objective import Batch, Item, collate_items, displacement
 from muslin.learn.drape.pipeline import ANY_FABRIC, DrapePipeline
 from muslin.learn.drape.predict import garment_of
+from muslin.learn.training.batches import evenly
 from muslin.learn.training.loop import Report, Settings, train
+from muslin.learn.training.machine import training_device
+
+MOST_VALIDATED = 24
+"""Drapes of a split that are looked at after each epoch."""
 
 _USUAL = Settings(epochs=20, learning_rate=3e-4)
 
@@ -56,24 +60,29 @@ class CollisionObjective:
         """name: of the network in `pipeline.fine`; validation: {name: [(garment, shape)]} of which the share
         of vertices inside the body is logged."""
         self.pipeline, self.name, self.garments = pipeline, name, list(garments)
-        self.validation, self.options = validation, options
-        self.before = copy.deepcopy(pipeline.fine[name]).eval()
-        self.body = pipeline.body
+        self.options, self.body, self.device = options, pipeline.body, training_device()
+        self.before = copy.deepcopy(pipeline.fine[name]).to(self.device).eval()
         self.fabrics = pipeline.world.fabrics if name == ANY_FABRIC else (name,)
-        self.device = "cuda" if torch.cuda.is_available() else "cpu"
+        self.validation = {
+            key: [
+                self._batch([garment], [shape], [fabric])
+                for garment, shape in pairs
+                for fabric in self.fabrics
+            ]
+            for key, pairs in validation.items()
+        }
 
     def steps(self) -> int:
         return self.options.steps
 
-    def batches(self, epoch: int, rank: int, world: int) -> Iterator[tuple[Batch, list[Tensor]]]:
+    def batches(self, epoch: int, rank: int, world: int) -> Iterator[Batch]:
         for step in range(self.options.steps):
             draw = np.random.default_rng([self.options.settings.seed, epoch, step, rank])
             count = min(self.options.batch, len(self.garments))
             chosen = [self.garments[k] for k in draw.choice(len(self.garments), count, replace=False)]
             shapes = [self._shape(draw) for _ in chosen]
             fabrics = [str(draw.choice(self.fabrics)) for _ in chosen]
-            items = self._items(chosen, shapes, fabrics)
-            yield collate_items(items, self.device), shapes
+            yield self._batch(chosen, shapes, fabrics)
 
     def _shape(self, draw: np.random.Generator) -> Tensor:
         """Of the coefficients that the networks see, as widely as they were trained."""
@@ -83,47 +92,40 @@ class CollisionObjective:
         return torch.tensor(draw.uniform(-half, half, network.config.betas), dtype=torch.float32)
 
     @torch.no_grad()
-    def _items(
+    def _batch(
         self, garments: Sequence[PreparedGarment], shapes: Sequence[Tensor], fabrics: Sequence[str]
-    ) -> list[Item]:
+    ) -> Batch:
+        """From smooth drapes to what the network said of them before."""
         starts = self.pipeline.smooth_drapes(garments, shapes)
         figures = [*fabric_figures(fabrics)] if self.name == ANY_FABRIC else [None] * len(garments)
         items = [
             Item(garment, shape, start, start, fabric)
             for garment, shape, start, fabric in zip(garments, shapes, starts, figures, strict=True)
         ]
-        batch = collate_items(items)
-        said = (batch.start + displacement(self.before, batch)).split([len(start) for start in starts])
-        return [
-            Item(item.garment, item.beta, item.start, goal, item.fabric)
-            for item, goal in zip(items, said, strict=True)
-        ]
+        batch = collate_items(items, self.device)
+        return replace(batch, goal=batch.start + displacement(self.before, batch))
 
-    def loss(self, model: nn.Module, batch: tuple[Batch, list[Tensor]]) -> Tensor:
-        told, shapes = batch
-        points = told.start + displacement(model, told)
-        counts = torch.bincount(told.graphs.graph[0]).tolist()
-        parts = zip(points.split(counts), shapes, strict=True)
-        inside = torch.stack(
-            [collision_loss(part, shape, self.body, self.options.kind) for part, shape in parts]
-        )
-        moved = ((points - told.goal) / MARGIN).square().sum(1).mean()
-        return inside.mean() + self.options.anchor * moved
+    def loss(self, model: nn.Module, batch: Batch) -> Tensor:
+        points = batch.start + displacement(model, batch)
+        counts = torch.bincount(batch.graphs.graph[0]).tolist()
+        inside = [
+            collision_loss(part, shape, self.body, self.options.kind)
+            for part, shape in zip(points.split(counts), batch.beta, strict=True)
+        ]
+        moved = ((points - batch.goal) / MARGIN).square().sum(1).mean()
+        return torch.stack(inside).mean() + self.options.anchor * moved
 
     def validate(self, model: nn.Module) -> dict[str, float]:
-        assert isinstance(model, DrapeNetwork)
-        return {f"{name}_inside": self.inside(model, pairs) for name, pairs in self.validation.items()}
+        return {
+            f"{name}_inside": float(np.mean([self._inside(model, batch) for batch in batches]))
+            for name, batches in self.validation.items()
+        }
 
-    @torch.no_grad()
-    def inside(self, model: DrapeNetwork, pairs: Sequence[tuple[PreparedGarment, Tensor]]) -> float:
-        """Share of the vertices of all pairs of garment and shape that are inside the body."""
-        shares = []
-        for garment, shape in pairs:
-            for fabric in self.fabrics:
-                batch = collate_items(self._items([garment], [shape], [fabric]), self.device)
-                points = (batch.start + displacement(model, batch)).cpu().numpy()
-                shares.append((self.body.nearest(points, shape)[1] < 0.0).mean())
-        return float(np.mean(shares))
+    def _inside(self, model: nn.Module, batch: Batch) -> float:
+        """Share of the vertices of the one garment of a batch that are inside the body."""
+        points = (batch.start + displacement(model, batch)).cpu().numpy()
+        _, signs = self.body.nearest(points, batch.beta[0].tolist())
+        return float((signs < 0.0).mean())
 
     def identity(self) -> dict[str, Any]:
         options = self.options
@@ -178,8 +180,7 @@ def fine_tune(
     """
     garments = random_garments(pipeline, examples, options.garments, options.settings.seed)
     pairs = {
-        name: [(pipeline.prepare(own.garments[e.garment]), e.beta) for e in own.examples[:: _stride(own)]]
-        for name, own in {"train": examples, **(validation or {})}.items()
+        name: _some_pairs(pipeline, own) for name, own in {"train": examples, **(validation or {})}.items()
     }
     for name, network in pipeline.fine.items():
         objective = CollisionObjective(pipeline, name, garments, pairs, options)
@@ -192,5 +193,8 @@ def fine_tune(
     return pipeline
 
 
-def _stride(examples: Examples, most: int = 24) -> int:
-    return max(1, len(examples.examples) // most)
+def _some_pairs(pipeline: DrapePipeline, examples: Examples) -> list[tuple[PreparedGarment, Tensor]]:
+    """Garment and shape of some of the examples."""
+    some = [examples.examples[k] for k in evenly(len(examples.examples), MOST_VALIDATED)]
+    garments = {place: pipeline.prepare(examples.garments[place]) for place in {e.garment for e in some}}
+    return [(garments[example.garment], example.beta) for example in some]

@@ -20,8 +20,10 @@ from muslin.garments.template import template
 from muslin.learn.drape.dense import DenseDrapes, place_on_template
 from muslin.learn.drape.fabric import file_stem
 from muslin.learn.drape.world import World, shape_tensor
+from muslin.learn.training.batches import ShuffledBatches
 from muslin.learn.training.checkpoint import read_tensors, write_tensors
 from muslin.learn.training.loop import Report, Settings, train
+from muslin.learn.training.machine import training_device
 
 FULLY_CONNECTED = (512, 1024)
 """Widths of the network that Vidaurre 2024, chapter 4, compares with; on design parameters and shape."""
@@ -144,31 +146,27 @@ def load_dense(folder: Path) -> DenseDraper:
 class _DenseObjective:
     """Mean squared error of all coordinates, over the spread."""
 
-    def __init__(self, inputs: Tensor, positions: Tensor, batch: int, seed: int) -> None:
-        self.inputs, self.positions = inputs, positions
-        self.batch, self.seed = min(batch, len(inputs)), seed
+    def __init__(self, inputs: Tensor, positions: Tensor, order: ShuffledBatches, spread: float) -> None:
+        self.inputs, self.positions, self.order, self.spread = inputs, positions, order, spread
+        self.device = training_device()
 
     def steps(self) -> int:
-        return len(self.inputs) // self.batch
+        return self.order.steps
 
     def batches(self, epoch: int, rank: int, world: int) -> Iterator[tuple[Tensor, Tensor]]:
-        order = np.random.default_rng([self.seed, epoch]).permutation(len(self.inputs))
-        for step in range(self.steps()):
-            chosen = torch.from_numpy(order[step * self.batch : (step + 1) * self.batch][rank::world])
-            yield self.inputs[chosen], self.positions[chosen]
+        for places in map(torch.from_numpy, self.order.places(epoch, rank, world)):
+            yield self.inputs[places].to(self.device), self.positions[places].to(self.device)
 
     def loss(self, model: nn.Module, batch: tuple[Tensor, Tensor]) -> Tensor:
-        network = getattr(model, "module", model)
-        assert isinstance(network, DenseNetwork)
-        inputs, positions = (values.to(network.centre.device) for values in batch)
-        return ((model(inputs) - positions) / network.spread).square().mean()
+        inputs, positions = batch
+        return ((model(inputs) - positions) / self.spread).square().mean()
 
     def validate(self, model: nn.Module) -> dict[str, float]:
         return {}
 
     def identity(self) -> Mapping[str, Any]:
         digest = sha256(self.inputs.numpy().tobytes() + self.positions.numpy().tobytes()).hexdigest()
-        return {"items": len(self.inputs), "batch": self.batch, "data": digest}
+        return {"items": len(self.inputs), "batch": self.order.size, "data": digest}
 
 
 def train_fully_connected(
@@ -215,7 +213,8 @@ def _trained(
         torch.manual_seed(settings.seed)
         network = DenseNetwork(config)
         network.normalise(inputs[own], drapes.positions[own])
-        objective = _DenseObjective(inputs[own], drapes.positions[own], batch, settings.seed)
+        order = ShuffledBatches(int(own.sum()), batch, settings.seed)
+        objective = _DenseObjective(inputs[own], drapes.positions[own], order, float(network.spread))
         train(network, objective, settings, out / "train" / file_stem(fabric), report=report)
         networks[fabric] = network.cpu().eval()
     draper = DenseDraper(networks)

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from muslin.learn.drape.garment import PreparedGarment
-from muslin.learn.drape.network import DrapeNetwork
 from muslin.learn.graph.batch import GraphBatch, batch_pyramids
+from muslin.learn.training.batches import ShuffledBatches
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def displacement(model: nn.Module, batch: Batch) -> Tensor:
 
 
 class DisplacementObjective:
-    """Mean over vertices of |d - (goal - start)|^2 / (3 s^2), s the spread of the network's displacements.
+    """Mean over vertices of |d - (goal - start)|^2 / (3 s^2), s the spread of the goals' displacements.
 
     Source: Vidaurre 2024, chapter 4: squared displacement error; weight decay is the optimizer's.
     """
@@ -74,37 +74,34 @@ class DisplacementObjective:
         *,
         batch: int,
         seed: int,
+        spread: float,
         device: torch.device | str = "cpu",
     ) -> None:
-        """validation: {name: items} whose mean vertex error is logged; batch: items of one."""
+        """validation: {name: items} whose mean vertex error is logged; batch: items of one;
+        spread: s, metres."""
         self.items, self.validation = list(items), validation
-        self.batch, self.seed, self.device = min(batch, len(items)), seed, device
+        self.order, self.spread, self.device = ShuffledBatches(len(items), batch, seed), spread, device
 
     def steps(self) -> int:
-        return len(self.items) // self.batch
+        return self.order.steps
 
     def batches(self, epoch: int, rank: int, world: int) -> Iterator[Batch]:
-        order = np.random.default_rng([self.seed, epoch]).permutation(len(self.items))
-        for step in range(self.steps()):
-            chosen = order[step * self.batch : (step + 1) * self.batch][rank::world]
-            yield collate_items([self.items[k] for k in chosen], self.device)
+        for places in self.order.places(epoch, rank, world):
+            yield collate_items([self.items[k] for k in places], self.device)
 
     def loss(self, model: nn.Module, batch: Batch) -> Tensor:
         error = displacement(model, batch) - (batch.goal - batch.start)
-        network = getattr(model, "module", model)  # as several processes wrap it
-        assert isinstance(network, DrapeNetwork)
-        return (error / network.spread).square().mean()
+        return (error / self.spread).square().mean()
 
     def validate(self, model: nn.Module) -> dict[str, float]:
-        assert isinstance(model, DrapeNetwork)
         return {
             f"{name}_mm": 1e3 * float(np.mean([float(d) for d in self._errors(model, items)]))
             for name, items in self.validation.items()
         }
 
     def _errors(self, model: nn.Module, items: Sequence[Item]) -> Iterator[Tensor]:
-        for first in range(0, len(items), self.batch):
-            some = items[first : first + self.batch]
+        for first in range(0, len(items), self.order.size):
+            some = items[first : first + self.order.size]
             batch = collate_items(some, self.device)
             error = (displacement(model, batch) - (batch.goal - batch.start)).norm(dim=1)
             yield from (part.mean() for part in error.split([len(item.start) for item in some]))
@@ -114,4 +111,4 @@ class DisplacementObjective:
         for item in self.items:
             for values in (item.start, item.goal, item.beta):
                 sha.update(values.numpy().tobytes())
-        return {"items": len(self.items), "batch": self.batch, "data": sha.hexdigest()}
+        return {"items": len(self.items), "batch": self.order.size, "data": sha.hexdigest()}

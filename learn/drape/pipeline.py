@@ -23,7 +23,7 @@ from muslin.learn.graph.pyramid import PyramidCache
 from muslin.learn.training.checkpoint import read_tensors, write_tensors
 from muslin.sim.dataset import durable
 
-MEAN, SMOOTH, FINE = "mean.safetensors", "smooth.safetensors", "fine"
+MEAN, SMOOTH, FINE, GRAPHS = "mean.safetensors", "smooth.safetensors", "fine", "graphs"
 ANY_FABRIC = "any"
 """Name of the R_fine that sees the fabric."""
 

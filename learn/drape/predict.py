@@ -15,7 +15,7 @@ from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.garments.template import template
 from muslin.learn.drape.fully_connected import load_dense
-from muslin.learn.drape.pipeline import MEAN, load_pipeline
+from muslin.learn.drape.pipeline import GRAPHS, MEAN, load_pipeline
 from muslin.learn.drape.world import Draper
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.reader import Dataset, write_dataset
@@ -33,7 +33,7 @@ def load_draper(folder: Path) -> Draper[Any]:
     Raises InputError if it holds neither, or is damaged.
     """
     if (folder / MEAN).exists():
-        return load_pipeline(folder, folder / "graphs")
+        return load_pipeline(folder, folder / GRAPHS)
     return load_dense(folder)
 
 

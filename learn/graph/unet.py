@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from muslin.garments.errors import InputError
-from muslin.learn.graph.batch import GraphBatch
+from muslin.learn.graph.batch import GraphBatch, Operator
 from muslin.learn.graph.chebyshev import ChebyshevConvolution
 
 
@@ -70,7 +70,7 @@ class _Block(nn.Module):
         self.second = ChebyshevConvolution(outputs, outputs, order)
         self.skip = nn.Identity() if inputs == outputs else nn.Linear(inputs, outputs)
 
-    def forward(self, x: Tensor, laplacian: object) -> Tensor:
+    def forward(self, x: Tensor, laplacian: Operator) -> Tensor:
         y = self.first(functional.silu(self.norm(x)), laplacian)
         out: Tensor = self.skip(x) + self.second(functional.silu(y), laplacian)
         return out

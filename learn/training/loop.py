@@ -1,4 +1,4 @@
-"""The training loop: every network of muslin is trained by it."""
+"""The training loop of networks that learn from batches."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from muslin.garments.errors import InputError
 from muslin.learn.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from muslin.learn.training.curve import draw_curve
+from muslin.learn.training.machine import training_device
 from muslin.sim.dataset import durable
 
 Report = Callable[[float, int, str], None]
@@ -77,7 +78,6 @@ def train(
     settings: Settings,
     out: Path,
     *,
-    groups: list[dict[str, Any]] | None = None,
     report: Report | None = None,
 ) -> list[dict[str, float]]:
     """Train a model; return a row of figures for every epoch.
@@ -85,13 +85,12 @@ def train(
     Every CHECKPOINT_S seconds and at the end `out` gets a checkpoint, from which the same call goes on to the
     same weights, the history as lines of JSON, and logs for TensorBoard; at the end the loss curve too.
 
-    groups: of parameters, for the optimizer. Raises InputError if `out` holds another training, and if the
-    loss is not finite.
+    Raises InputError if `out` holds another training, and if the loss is not finite.
     """
     durable.make_folder(out)
-    accelerator = Accelerator(cpu=not torch.cuda.is_available())
+    accelerator = Accelerator(cpu=training_device().type == "cpu")
     optimizer = torch.optim.AdamW(
-        groups or model.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
+        model.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay
     )
     run = {"settings": asdict(settings), **objective.identity()}
     progress = load_checkpoint(out, model, optimizer, run)

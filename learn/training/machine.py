@@ -15,6 +15,11 @@ def use_all_cores() -> None:
     torch.set_num_threads(usable_cores())
 
 
+def training_device() -> torch.device:
+    """A GPU if there is one."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
 def count_weights(networks: Iterable[nn.Module]) -> int:
     """Trained numbers in all of the networks."""
     return sum(weight.numel() for network in networks for weight in network.parameters())

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from muslin.garments.errors import InputError
-from muslin.learn.drape.body_surface import FAR, BodySurface
+from muslin.learn.drape.body_surface import BodySurface
 from muslin.learn.drape.collisions import MARGIN, collision_loss
 from muslin.learn.drape.world import World
 from muslin.sim.body.load import load_body
@@ -47,8 +47,11 @@ def test_nearest_points_and_signs_are_those_of_libigl(body: BodySurface, cloud: 
 
 
 def test_far_points_are_outside(body: BodySurface) -> None:
-    found, signs = body.nearest(np.array([[3.0 * FAR, 0.0, 0.0]]), BETA)
-    assert (found.tolist(), signs.tolist()) == ([[3.0, 0.0, 0.0]], [1.0])
+    found, signs = body.nearest(np.array([[3.0, 0.0, 0.0]]), BETA)
+    assert signs.tolist() == [1.0]
+    vertices = body.vertices(BETA)
+    hand = vertices[vertices[:, 0].argmax()]
+    assert np.linalg.norm(found[0] - hand) < 0.1
 
 
 @pytest.mark.parametrize("kind", ["distance", "nearest-vertex"])
@@ -66,7 +69,7 @@ def test_gradient_is_that_of_the_loss(body: BodySurface, cloud: torch.Tensor) ->
     points = cloud.clone().requires_grad_(True)
     loss = collision_loss(points, BETA, body)
     (gradient,) = torch.autograd.grad(loss, points)
-    # In the sum over many points, float32 nearest points and edges of the body even out.
+    # In the sum over many points, edges of the body even out.
     direction = gradient / gradient.norm()
     step = 2e-4
     ahead, behind = (collision_loss(cloud + s * step * direction, BETA, body) for s in (1.0, -1.0))

@@ -1,8 +1,11 @@
 """Generate the dataset of the SIGKILL test: `python sheet_main.py OUT WORKERS`."""
 
+import signal
 import sys
 
 if __name__ == "__main__":
+    # What a shell starts in the background ignores interrupts, and so would this process.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # Inside, so that the workers, which import this file too, start without it.
     from sheet_producer import make_scene, sheets_config, simulate
 

@@ -287,8 +287,6 @@ def start(out: Path, delay: float, workers: int = 1, hold: float = math.inf) -> 
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        # What a shell starts in the background ignores interrupts, and so would this process.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 

@@ -14,7 +14,7 @@ from sheet_producer import make_sample
 from unpacked import chunk_of, entries_of, replace_file, unpacked
 
 from muslin.garments.errors import InputError
-from muslin.sim.dataset import store
+from muslin.sim.dataset import durable, store
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.header import Header, digest, prepare_root
 from muslin.sim.dataset.local_root import LocalRoot
@@ -116,11 +116,26 @@ def test_a_write_that_fails_leaves_nothing_behind(root: LocalRoot, monkeypatch: 
     def full(handle: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    monkeypatch.delenv(durable.NO_SYNC, raising=False)
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
         store.write_sample(root, make_sample())
     assert store.stored_ids(root) == []
     assert not list((root.path / PARTIAL).iterdir())
+
+
+@pytest.mark.parametrize(("asked", "waits"), [(None, True), ("0", True), ("1", False)])
+def test_samples_wait_for_the_disk_unless_told_not_to(
+    root: LocalRoot, monkeypatch: pytest.MonkeyPatch, asked: str | None, waits: bool
+) -> None:
+    waited: list[int] = []
+    monkeypatch.setattr(os, "fsync", waited.append)
+    monkeypatch.delenv(durable.NO_SYNC, raising=False)
+    if asked is not None:
+        monkeypatch.setenv(durable.NO_SYNC, asked)
+    assert store.write_sample(root, make_sample()).new
+    assert bool(waited) == waits
+    assert store.stored_ids(root) == ["sheet"]
 
 
 @pytest.mark.parametrize("name", ["positions", "faces", "panel_vertices", "obstacle_vertices"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -45,7 +44,6 @@ def start(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=heed_interrupts,
     )
 
 
@@ -54,11 +52,6 @@ def environment_of(more: dict[str, str] | None = None, before: Path | None = Non
     found = [before, HERE, HERE.parent, os.environ.get("PYTHONPATH")]
     paths = os.pathsep.join(str(path) for path in found if path)
     return os.environ | {"PYTHONPATH": paths} | (more or {})
-
-
-def heed_interrupts() -> None:
-    """What a shell starts in the background ignores interrupts, and so would what it starts."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def stored(out: str | Path) -> int:

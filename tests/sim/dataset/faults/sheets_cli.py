@@ -1,8 +1,11 @@
 """`muslin`, of which `generate` makes sheets: the command itself, with another simulator."""
 
+import signal
 from functools import partial
 
 if __name__ == "__main__":
+    # What a shell starts in the background ignores interrupts, and so would this process.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # Inside, so that the workers, which import this file too, start without it.
     from faulty_producer import simulate
     from sheet_producer import make_scene

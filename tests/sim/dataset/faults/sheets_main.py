@@ -5,10 +5,13 @@ argument: what a `Cluster` is made of, and `lease`, seconds between beats, and a
 """
 
 import json
+import signal
 import sys
 from functools import partial
 
 if __name__ == "__main__":
+    # What a shell starts in the background ignores interrupts, and so would this process.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # Inside, so that the workers, which import this file too, start without it.
     from sheets import make
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from sheets import HERE, SECONDS, environment_of, heed_interrupts, stored
+from sheets import HERE, SECONDS, environment_of, stored
 
 from benchmarks.faults import Contents, alive, contents, descendants, wait_until
 from muslin.sim.dataset.schema import PARTIAL
@@ -46,7 +46,6 @@ def command(folder: Path, **environment: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=heed_interrupts,
     )
 
 
