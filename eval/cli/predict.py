@@ -12,10 +12,15 @@ from muslin.garments.errors import InputError
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(metavar="MODEL_DIR", help="What `muslin train` wrote.")],
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="FILE.obj, or a new folder with --dataset.")
     ],
+    model: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[MODEL_DIR]", help="What `muslin train` wrote; else the tees that come with muslin."
+        ),
+    ] = None,
     design: Annotated[
         list[str] | None,
         typer.Option("--design", metavar="KEY=METRES", help="A design parameter. Repeatable."),
@@ -35,12 +40,16 @@ def predict(
         str | None, typer.Option("--dataset", metavar="DIR", help="Predict all samples of a dataset instead.")
     ] = None,
     split: Annotated[str | None, typer.Option("--split", metavar="NAME", help="Of the dataset.")] = None,
+    push_out: Annotated[
+        bool, typer.Option("--push-out", help="Take out of the body what was predicted inside it.")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Drape a garment by trained networks, or all garments of a dataset, as a dataset to be scored.
 
     \b
     Examples:
+      muslin predict --design garment_length=0.8 --beta 1.5 --out tee.obj
       muslin predict out/pipeline --design sleeve_length=0.3 --beta 1.5 --out tee.obj
       muslin predict out/pipeline --dataset out/thesis_static --split test-designs --out out/predicted
     """
@@ -52,11 +61,13 @@ def predict(
             raise InputError(f"{out}: a garment is written as .obj, not {out.suffix!r}")
         check_new(out, force)
 
-    from muslin.learn.drape.predict import garment_of, load_draper, predict_dataset, predict_one
+    from muslin.learn.drape.predict import SHIPPED, garment_of, load_draper, predict_dataset, predict_one
+    from muslin.learn.drape.push_out import PushedOut
     from muslin.learn.training.machine import use_all_cores
 
     use_all_cores()
-    draper = load_draper(model)
+    learned = load_draper(model or SHIPPED)
+    draper = PushedOut(learned) if push_out else learned
     if dataset is not None:
         from muslin.eval.cli.progress import progress_bar
         from muslin.sim.dataset.selection import select

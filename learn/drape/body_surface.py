@@ -33,12 +33,13 @@ class BodySurface:
 
     def nearest(
         self, points: NDArray[np.floating], beta: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Of points (P, 3) the nearest points of the body (P, 3), metres, and signs (P,): -1 inside."""
-        distances, _, found, _ = igl.signed_distance(
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Distances (P,) of points (P, 3) to the body, negative inside, metres, its nearest points (P, 3) and
+        its normals there (P, 3), those of `igl.signed_distance`."""
+        distances, _, found, normals = igl.signed_distance(
             np.ascontiguousarray(points, dtype=np.float64),
             self.vertices(beta),
             self.faces,
             sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
         )
-        return found, np.where(distances < 0.0, -1.0, 1.0)
+        return distances, found, normals

@@ -31,8 +31,8 @@ def collision_loss(points: Tensor, beta: Tensor, body: BodySurface, kind: Kind =
     """
     where = points.detach().double().cpu().numpy()
     if kind == "distance":
-        found, signs = body.nearest(where, beta.tolist())
-        nearest, sign = (torch.from_numpy(values).to(points) for values in (found, signs))
+        distances, found, _ = body.nearest(where, beta.tolist())
+        nearest, sign = (torch.from_numpy(values).to(points) for values in (found, np.sign(distances)))
         depth = sign * (points - nearest).norm(dim=1)
     elif kind == "nearest-vertex":
         vertices = body.vertices(beta.tolist())

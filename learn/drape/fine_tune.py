@@ -124,8 +124,8 @@ class CollisionObjective:
     def _inside(self, model: nn.Module, batch: Batch) -> float:
         """Share of the vertices of the one garment of a batch that are inside the body."""
         points = (batch.start + displacement(model, batch)).cpu().numpy()
-        _, signs = self.body.nearest(points, batch.beta[0].tolist())
-        return float((signs < 0.0).mean())
+        distances, *_ = self.body.nearest(points, batch.beta[0].tolist())
+        return float((distances < 0.0).mean())
 
     def identity(self) -> dict[str, Any]:
         options = self.options

@@ -23,6 +23,8 @@ from muslin.sim.dataset.root import Root
 from muslin.sim.dataset.sample import BodyTrack, Sample
 from muslin.sim.remesh.topology import remesh
 
+SHIPPED = Path(__file__).parent / "assets" / "tee"
+"""A pipeline that comes with the package; its model card is beside it."""
 RESOLUTION = 4000
 """Template from which triangulations are drawn."""
 
@@ -33,7 +35,7 @@ def load_draper(folder: Path) -> Draper[Any]:
     Raises InputError if it holds neither, or is damaged.
     """
     if (folder / MEAN).exists():
-        return load_pipeline(folder, folder / GRAPHS)
+        return load_pipeline(folder, None if folder == SHIPPED else folder / GRAPHS)
     return load_dense(folder)
 
 

@@ -32,13 +32,17 @@ class Smoother:
             raise InputError(f"length = {length:g} m; it must be positive")
         mass, stiffness = sewn_operators(mesh)
         self._mass = mass
-        second = stiffness @ diags_array(1.0 / mass) @ stiffness
-        self._factors = splu(csc_array(diags_array(mass) + length**4 * second))
+        self._factors = splu(smoothing_matrix(mass, stiffness, length))
 
     def __call__(self, x: NDArray[np.floating]) -> NDArray[np.float64]:
         """y (V, C) of values x (V, C) at sewn vertices."""
         y: NDArray[np.float64] = self._factors.solve(self._mass[:, None] * np.asarray(x, dtype=np.float64))
         return y
+
+
+def smoothing_matrix(mass: NDArray[np.float64], stiffness: csr_array, length: float) -> csc_array:
+    """M + l^4 K M^-1 K (V, V) of lumped mass M (V,) and stiffness K; length: l, metres."""
+    return csc_array(diags_array(mass) + length**4 * (stiffness @ diags_array(1.0 / mass) @ stiffness))
 
 
 def sewn_operators(mesh: GarmentMesh) -> tuple[NDArray[np.float64], csr_array]:

@@ -20,7 +20,8 @@ from muslin.learn.drape.examples import mean_drapes, read_examples
 from muslin.learn.drape.fine_tune import FineTuning, fine_tune
 from muslin.learn.drape.fully_connected import load_dense, train_fully_connected, train_single_garment
 from muslin.learn.drape.pipeline import ANY_FABRIC, DrapePipeline, load_pipeline
-from muslin.learn.drape.predict import garment_of, predict_dataset, predict_one
+from muslin.learn.drape.predict import SHIPPED, garment_of, load_draper, predict_dataset, predict_one
+from muslin.learn.drape.push_out import PushedOut
 from muslin.learn.drape.smoothing import LENGTH, Smoother
 from muslin.learn.drape.train import DrapeSettings, train_pipeline
 from muslin.learn.drape.world import Draper, in_body_frame
@@ -79,9 +80,8 @@ def test_garments_are_around_the_body_that_they_are_bound_to(
     for sample in dataset.split("train"):
         assert sample.body is not None
         points = in_body_frame(sample)
-        nearest, signs = pipeline.body.nearest(points, sample.body.beta)
-        assert (signs > 0.0).all()
-        assert np.linalg.norm(points - nearest, axis=1).min() < 0.005
+        distances, *_ = pipeline.body.nearest(points, sample.body.beta)
+        assert 0.0 < distances.min() < 0.005
         garment = pipeline.prepare(sample.garment)
         assert float((garment.skinned(sample.body.beta) - torch.from_numpy(points)).norm(dim=1).mean()) < 0.05
 
@@ -248,6 +248,57 @@ def test_the_command_line_trains_and_predicts(dataset: Dataset, folder: Path) ->
     assert again.exit_code == 2
     wrong = CliRunner().invoke(app, ["predict", data, *asked, "--out", str(folder / "b.obj")])
     assert wrong.exit_code == 2
+
+    apart = folder / "by-stages"
+    run("train", "smooth", "--dataset", data, "--out", str(apart), "--epochs", "1")
+    assert not load_pipeline(apart).fine
+    run("train", "fine", "--dataset", data, "--out", str(apart), "--epochs", "1")
+    for file in ("mean.safetensors", "smooth.safetensors", "fine/gray-interlock.safetensors"):
+        assert (apart / file).read_bytes() == (Path(model) / file).read_bytes()
+    few = ["--dataset", data, "--epochs", "1"]
+    run("train", "collisions", model, "--garments", "2", *few, "--out", str(folder / "c"))
+    run("train", "fc", *few, "--out", str(folder / "f"))
+    run(
+        "train",
+        "ssch",
+        "--design",
+        dataset.split("train").rows[0]["design"],
+        *few,
+        "--out",
+        str(folder / "s"),
+    )
+    for made in ("c", "f", "s"):
+        assert load_draper(folder / made).world == load_draper(Path(model)).world
+
+
+def test_what_is_pushed_out_is_outside_and_nearly_where_it_was(
+    pipeline: DrapePipeline, dataset: Dataset
+) -> None:
+    pushed = PushedOut(pipeline)
+    for sample in dataset.split("test-designs"):
+        assert sample.body is not None
+        ask = [sample.body.beta], [sample.fabric]
+        (said,) = pipeline.drapes([pipeline.prepare(sample.garment)], *ask)
+        (outside,) = pushed.drapes([pushed.prepare(sample.garment)], *ask)
+        distances, *_ = pipeline.body.nearest(outside.numpy(), sample.body.beta)
+        assert (distances > -1e-6).all()
+        assert float((outside - said).norm(dim=1).mean()) < 1e-3
+
+
+def test_the_shipped_networks_drape(dataset: Dataset, folder: Path) -> None:
+    shipped = load_draper(SHIPPED)
+    assert shipped.world.fabrics == ("gray-interlock", "white-dots-on-blk")
+    files = [file for file in SHIPPED.rglob("*") if file.is_file()]
+    assert sum(file.stat().st_size for file in files) < 8e6
+    assert errors(shipped, dataset.split("test-designs")).mean() < 0.012
+    out = folder / "shipped.obj"
+    run("predict", "--design", "garment_length=0.8", "--beta", "1", "--out", str(out))
+    assert out.exists()
+
+
+def run(*command: str) -> None:
+    done = CliRunner().invoke(app, [*command])
+    assert done.exit_code == 0, done.output
 
 
 def test_any_triangulation_is_draped(pipeline: DrapePipeline) -> None:
