@@ -1,4 +1,4 @@
-"""Draws docs/images/learned_drapes.png: simulated drapes, a column each, and what methods predict of them below.
+"""Draws docs/images/learned_drapes.png: simulated drapes, a column each, and what methods predict below.
 
 python docs/images/learned_drapes.py out/static docs/images/learned_drapes.png NAME=out/prediction …
 """

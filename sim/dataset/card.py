@@ -201,7 +201,8 @@ import zarr
 
 packed = zarr.storage.ZipStore("samples/{row["id"]}.zarr.zip", mode="r")
 group = zarr.open_group(packed, mode="r")
-positions, faces = group["positions"][...], group["faces"][...]  # float32 {shape}, metres; int32
+positions = group["positions"][...]  # float32 {shape}, metres
+faces = group["faces"][...]  # int32 (triangles, 3)
 print(positions.shape, faces.shape, group.attrs["meta"]["certificate"])
 ```
 
