@@ -201,8 +201,7 @@ import zarr
 
 packed = zarr.storage.ZipStore("samples/{row["id"]}.zarr.zip", mode="r")
 group = zarr.open_group(packed, mode="r")
-positions = group["positions"][...]  # float32 {shape}, metres
-faces = group["faces"][...]  # int32 (triangles, 3)
+positions, faces = group["positions"][...], group["faces"][...]  # float32 {shape}, m; int32
 print(positions.shape, faces.shape, group.attrs["meta"]["certificate"])
 ```
 
