@@ -32,7 +32,10 @@ FabricInput = Annotated[
 ]
 Order = Annotated[int, typer.Option("--order", min=1, help="K of the Chebyshev polynomials.")]
 Skinned = Annotated[
-    bool, typer.Option("--skinned", help="Start from the mean drape carried along by the skin.")
+    bool,
+    typer.Option(
+        "--skinned/--from-mean", help="Start from the mean drape as the skin carries it, or as it is."
+    ),
 ]
 
 
@@ -45,7 +48,7 @@ def drape(
     learning_rate: Rate = 3e-3,
     order: Order = 3,
     fabric_input: FabricInput = False,
-    skinned: Skinned = False,
+    skinned: Skinned = True,
     precision: Precision = "no",
     seed: Seed = 0,
 ) -> None:
@@ -76,7 +79,7 @@ def smooth(
     batch: Batch = 8,
     learning_rate: Rate = 3e-3,
     order: Order = 3,
-    skinned: Skinned = False,
+    skinned: Skinned = True,
     precision: Precision = "no",
     seed: Seed = 0,
 ) -> None:
@@ -137,9 +140,9 @@ def collisions(
     garments: Annotated[int, typer.Option("--garments", min=1, help="Random ones that it learns on.")] = 48,
     anchor: Annotated[
         float, typer.Option("--anchor", min=0.0, help="Weight of staying what it was; the thesis: 0.")
-    ] = 0.01,
+    ] = 0.002,
     batch: Batch = 4,
-    learning_rate: Rate = 3e-4,
+    learning_rate: Rate = 1e-3,
     seed: Seed = 0,
 ) -> None:
     """Fine-tune R_fine against penetration: random garments on random bodies, and no simulation.

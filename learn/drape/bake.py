@@ -1,7 +1,7 @@
 """Makes the networks that come with the package, of half the size, from a trained pipeline.
 
 muslin generate scenes/datasets/thesis_static.toml --preset small --out out/static
-muslin train drape --dataset out/static --out out/pipeline --skinned
+muslin train drape --dataset out/static --out out/pipeline
 python -m muslin.learn.drape.bake out/pipeline
 """
 

@@ -26,7 +26,7 @@ from muslin.learn.training.machine import training_device
 MOST_VALIDATED = 24
 """Drapes of a split that are looked at after each epoch."""
 
-_USUAL = Settings(epochs=20, learning_rate=3e-4)
+_USUAL = Settings(epochs=20, learning_rate=1e-3)
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class FineTuning:
     garments: int = 48
     steps: int = 25
     batch: int = 4
-    anchor: float = 0.01
+    anchor: float = 0.002
 
 
 class CollisionObjective:

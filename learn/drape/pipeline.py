@@ -32,17 +32,17 @@ ANY_FABRIC = "any"
 class DrapePipeline:
     """R_mean, R_smooth and R_fine.
 
-        x = x_0 + R_smooth(x_0, w, beta) + R_fine(x_smooth, w, beta[, fabric]),   x_0 = x_mean
+        x = x_smooth + R_fine(x_smooth, w, beta[, fabric]),   x_smooth = x_0 + R_smooth(x_0, w, beta)
 
-    skinned   whether x_0 is x_mean carried along by the skin to the shape beta instead
-    fine      {fabric: network}, or {ANY_FABRIC: one that sees the fabric}; what has none is draped smooth
+    skinned   whether x_0 is x_mean carried along by the skin to the shape beta, or x_mean, as in the thesis
+    fine      {fabric: network}, or {ANY_FABRIC: one that sees the fabric}; {}: drapes stay smooth
     """
 
     world: World
     mean: MeanDrape
     smooth: DrapeNetwork
     fine: dict[str, DrapeNetwork] = field(default_factory=dict)
-    skinned: bool = False
+    skinned: bool = True
     cache: PyramidCache = field(default_factory=PyramidCache)
 
     def __post_init__(self) -> None:
@@ -70,14 +70,14 @@ class DrapePipeline:
         Raises InputError for a fabric that no network knows.
         """
         smooth = self.smooth_drapes(garments, betas)
+        if not self.fine:
+            return smooth
         if ANY_FABRIC in self.fine:
             return self._moved(self.fine[ANY_FABRIC], garments, smooth, betas, fabric_figures(fabrics))
         found: list[Tensor] = list(smooth)
         for fabric in dict.fromkeys(fabrics):
             if fabric not in self.fine:
-                raise InputError(
-                    f"fabric {fabric!r}: there are networks for {', '.join(self.fine) or 'none'}"
-                )
+                raise InputError(f"fabric {fabric!r}: there are networks for {', '.join(self.fine)}")
             places = [k for k, name in enumerate(fabrics) if name == fabric]
             own = [garments[k] for k in places], [smooth[k] for k in places], [betas[k] for k in places]
             for k, drape in zip(places, self._moved(self.fine[fabric], *own, None), strict=True):

@@ -49,7 +49,7 @@ class DrapeSettings:
     order: int = 3
     batch: int = 8
     fabric_input: bool = False
-    skinned: bool = False
+    skinned: bool = True
 
 
 Stage = Callable[[str], Report]

@@ -9,12 +9,15 @@ from matplotlib.figure import Figure
 
 
 def draw_curve(history: Sequence[Mapping[str, float]], file: Path) -> None:
-    """Loss over epochs in logarithmic scale, and below it every other figure; history: a row an epoch."""
-    keys = [key for key in history[0] if key not in ("epoch", "seconds", "loss")]
+    """Loss over epochs in logarithmic scale, and below it every other figure.
+
+    history: a row an epoch, of which the first may have no loss.
+    """
+    keys = [key for key in history[-1] if key not in ("epoch", "seconds", "loss")]
     epochs = [row["epoch"] for row in history]
     figure = Figure(figsize=(7.0, 3.0 if not keys else 5.5), layout="constrained")
     axes = figure.subplots(2 if keys else 1, 1, sharex=True, squeeze=False)[:, 0]
-    axes[0].semilogy(epochs, [row["loss"] for row in history], color="black", label="loss")
+    axes[0].semilogy(epochs, [row.get("loss", float("nan")) for row in history], color="black", label="loss")
     axes[0].set_ylabel("loss")
     for key in keys:
         axes[-1].plot(epochs, [row[key] for row in history], label=key)

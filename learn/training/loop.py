@@ -80,7 +80,7 @@ def train(
     *,
     report: Report | None = None,
 ) -> list[dict[str, float]]:
-    """Train a model; return a row of figures for every epoch.
+    """Train a model; return a row of figures for every epoch, and before them one for what it was (epoch 0).
 
     Every CHECKPOINT_S seconds and at the end `out` gets a checkpoint, from which the same call goes on to the
     same weights, the history as lines of JSON, and logs for TensorBoard; at the end the loss curve too.
@@ -98,7 +98,9 @@ def train(
     rank, world = accelerator.process_index, accelerator.num_processes
     steps = objective.steps()
     step, total = progress.epochs * steps, settings.epochs * steps
-    kept, stored = time.monotonic(), progress.epochs
+    kept, stored = time.monotonic(), len(progress.history)
+    if not progress.history:
+        progress.history.append({"epoch": 0, **_validate(wrapped, objective, accelerator)})
     for epoch in range(progress.epochs, settings.epochs):
         wrapped.train()
         begun, losses = time.perf_counter(), []
@@ -115,9 +117,7 @@ def train(
             step += 1
             if report is not None and accelerator.is_main_process:
                 report(step, total, f"epoch {epoch + 1} of {settings.epochs}, loss {float(losses[-1]):.3g}")
-        wrapped.eval()
-        with torch.no_grad():
-            figures = objective.validate(accelerator.unwrap_model(wrapped))
+        figures = _validate(wrapped, objective, accelerator)
         mean = float(accelerator.gather(torch.stack(losses).mean()[None]).mean())
         row = {"epoch": epoch + 1, "loss": mean, "seconds": time.perf_counter() - begun, **figures}
         if not math.isfinite(mean):
@@ -127,10 +127,16 @@ def train(
             progress.epochs = epoch + 1
             if time.monotonic() - kept > CHECKPOINT_S or progress.epochs == settings.epochs:
                 _keep(out, accelerator.unwrap_model(wrapped), optimizer.optimizer, progress, run, stored)
-                kept, stored = time.monotonic(), progress.epochs
+                kept, stored = time.monotonic(), len(progress.history)
     if accelerator.is_main_process:
         draw_curve(progress.history, out / CURVE)
     return progress.history
+
+
+def _validate(wrapped: nn.Module, objective: Objective, accelerator: Accelerator) -> dict[str, float]:
+    wrapped.eval()
+    with torch.no_grad():
+        return objective.validate(accelerator.unwrap_model(wrapped))
 
 
 def rate(done: float, warm_up: float) -> float:
@@ -148,13 +154,13 @@ def _keep(
     run: Mapping[str, Any],
     stored: int,
 ) -> None:
-    """stored: epochs that the logs have already."""
+    """stored: rows that the logs have already."""
     from torch.utils.tensorboard import SummaryWriter
 
     save_checkpoint(out, model, optimizer, progress, run)
     lines = "".join(json.dumps(row) + "\n" for row in progress.history)
     durable.write_file(out / LOG, lines.encode())
-    with SummaryWriter(str(out / "tensorboard"), purge_step=stored + 1) as writer:
+    with SummaryWriter(str(out / "tensorboard"), purge_step=stored) as writer:
         for row in progress.history[stored:]:
             for key in row.keys() - {"epoch"}:
                 writer.add_scalar(key, row[key], int(row["epoch"]))
