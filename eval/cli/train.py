@@ -140,7 +140,7 @@ def collisions(
     garments: Annotated[int, typer.Option("--garments", min=1, help="Random ones that it learns on.")] = 48,
     anchor: Annotated[
         float, typer.Option("--anchor", min=0.0, help="Weight of staying what it was; the thesis: 0.")
-    ] = 0.002,
+    ] = 0.008,
     batch: Batch = 4,
     learning_rate: Rate = 1e-3,
     seed: Seed = 0,

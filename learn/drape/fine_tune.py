@@ -39,7 +39,7 @@ class FineTuning:
     garments: int = 48
     steps: int = 25
     batch: int = 4
-    anchor: float = 0.002
+    anchor: float = 0.008
 
 
 class CollisionObjective:
