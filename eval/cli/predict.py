@@ -40,6 +40,12 @@ def predict(
         str | None, typer.Option("--dataset", metavar="DIR", help="Predict all samples of a dataset instead.")
     ] = None,
     split: Annotated[str | None, typer.Option("--split", metavar="NAME", help="Of the dataset.")] = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(
+            "--baseline", metavar="KIND", help="With --dataset: mean-on-skin or nearest, not the networks."
+        ),
+    ] = None,
     push_out: Annotated[
         bool, typer.Option("--push-out", help="Take out of the body what was predicted inside it.")
     ] = False,
@@ -52,22 +58,30 @@ def predict(
       muslin predict --design garment_length=0.8 --beta 1.5 --out tee.obj
       muslin predict out/pipeline --design sleeve_length=0.3 --beta 1.5 --out tee.obj
       muslin predict out/pipeline --dataset out/thesis_static --split test-designs --out out/predicted
+      muslin predict out/pipeline --dataset out/thesis_static --baseline nearest --out out/nearest
     """
     given = dict(_parameter(entry) for entry in design or [])
     if dataset is not None and (given or beta or fabric or target_area):
         raise InputError("--dataset says garments, shapes and fabrics itself; leave out the other options")
     if dataset is None:
+        if baseline is not None:
+            raise InputError("--baseline is a yardstick for whole datasets; give --dataset too")
         if out.suffix.lower() != ".obj":
             raise InputError(f"{out}: a garment is written as .obj, not {out.suffix!r}")
         check_new(out, force)
 
+    from muslin.learn.drape.baselines import baseline_of
     from muslin.learn.drape.predict import SHIPPED, garment_of, load_draper, predict_dataset, predict_one
     from muslin.learn.drape.push_out import PushedOut
     from muslin.learn.training.machine import use_all_cores
+    from muslin.sim.dataset.reader import open_dataset
 
     use_all_cores()
-    learned = load_draper(model or SHIPPED)
-    draper = PushedOut(learned) if push_out else learned
+    draper = load_draper(model or SHIPPED)
+    if baseline is not None:
+        draper = baseline_of(draper, baseline, open_dataset(str(dataset)))
+    if push_out:
+        draper = PushedOut(draper)
     if dataset is not None:
         from muslin.eval.cli.progress import progress_bar
         from muslin.sim.dataset.selection import select

@@ -13,10 +13,13 @@ from torch import Tensor
 from muslin.garments.correspondence import Correspondence
 from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
-from muslin.learn.drape.dense import DenseDrapes
+from muslin.learn.drape.dense import DenseDrapes, dense_drapes
+from muslin.learn.drape.examples import read_examples
 from muslin.learn.drape.garment import PreparedGarment
 from muslin.learn.drape.pipeline import DrapePipeline
-from muslin.learn.drape.world import World, shape_tensor
+from muslin.learn.drape.world import Draper, World, shape_tensor
+from muslin.sim.dataset.reader import Dataset
+from muslin.sim.dataset.selection import select
 
 
 class NearestDrape:
@@ -73,3 +76,17 @@ class SkinnedMean:
         self, garments: Sequence[PreparedGarment], betas: Sequence[Any], fabrics: Sequence[str]
     ) -> list[Tensor]:
         return [garment.skinned(beta) for garment, beta in zip(garments, betas, strict=True)]
+
+
+def baseline_of(draper: Draper[Any], kind: str, dataset: Dataset) -> Draper[Any]:
+    """A baseline by its name: "mean-on-skin" of a pipeline, or "nearest" in the training set of a dataset.
+
+    Raises InputError for another name, and for the mean drape of networks that have none.
+    """
+    if kind == "nearest":
+        return NearestDrape(dense_drapes(read_examples(select(dataset, "train"))))
+    if kind != "mean-on-skin":
+        raise InputError(f"baseline {kind!r}: there are mean-on-skin and nearest")
+    if not isinstance(draper, DrapePipeline):
+        raise InputError("mean-on-skin needs R_mean: give the folder of a pipeline")
+    return SkinnedMean(draper)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 
 from muslin.eval.cli.app import app
 from muslin.garments.errors import InputError
-from muslin.learn.drape.baselines import NearestDrape, SkinnedMean
+from muslin.learn.drape.baselines import NearestDrape, SkinnedMean, baseline_of
 from muslin.learn.drape.collisions import collision_loss
 from muslin.learn.drape.dense import dense_drapes
 from muslin.learn.drape.examples import mean_drapes, read_examples
@@ -270,6 +271,28 @@ def test_the_command_line_trains_and_predicts(dataset: Dataset, folder: Path) ->
     )
     for made in ("c", "f", "s"):
         assert load_draper(folder / made).world == load_draper(Path(model)).world
+
+
+def test_without_fine_networks_drapes_stay_smooth(pipeline: DrapePipeline, dataset: Dataset) -> None:
+    smooth = replace(pipeline, fine={})
+    sample = dataset[0]
+    assert sample.body is not None
+    ask = [smooth.prepare(sample.garment)], [sample.body.beta]
+    assert torch.equal(smooth.drapes(*ask, [sample.fabric])[0], pipeline.smooth_drapes(*ask)[0])
+
+
+def test_baselines_are_predicted_by_command(pipeline: DrapePipeline, dataset: Dataset, folder: Path) -> None:
+    known = dense_drapes(read_examples(dataset.split("train")))
+    drapers = {"mean-on-skin": SkinnedMean(pipeline), "nearest": NearestDrape(known)}
+    for kind, draper in drapers.items():
+        part = dataset.split("test-designs")
+        run("predict", str(folder / "model"), "--dataset", str(folder / "data"), "--split", "test-designs",
+            "--baseline", kind, "--out", str(folder / kind))  # fmt: skip
+        told = open_dataset(folder / kind)
+        apart = predict_dataset(draper, part, folder / f"{kind}-apart")
+        assert all(np.array_equal(told[i].positions, apart[i].positions) for i in part.ids)
+    with pytest.raises(InputError, match="mean-on-skin and nearest"):
+        baseline_of(pipeline, "farthest", dataset)
 
 
 def test_what_is_pushed_out_is_outside_and_nearly_where_it_was(
