@@ -1,8 +1,9 @@
 """Makes the networks that come with the package, of half the size, from a trained pipeline.
 
 muslin generate scenes/datasets/thesis_static.toml --preset small --out out/static
-muslin train drape --dataset out/static --out out/pipeline
-python -m muslin.learn.drape.bake out/pipeline
+muslin train drape --dataset out/static --out out/drape --epochs 40
+muslin train collisions out/drape --dataset out/static --out out/tuned
+python -m muslin.learn.drape.bake out/tuned
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def members(result: Plan, label: str, split: str | None = None) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("preset", "shapes", "fabrics", "topologies"), [("small", 9, 2, 6), ("tiny", 3, 1, 3)]
+    ("preset", "shapes", "fabrics", "topologies"), [("small", 9, 2, 13), ("tiny", 3, 1, 3)]
 )
 def test_static_presets(preset: str, shapes: int, fabrics: int, topologies: int) -> None:
     result = planned(STATIC, preset)
