@@ -12,12 +12,16 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from typing import TypeVar
 
 from muslin.garments.errors import InputError
 
 Work = TypeVar("Work")
 Found = TypeVar("Found")
+
+AHEAD = 16
+"""Parts of the tasks that wait for each process: a slow one does not stop the others soon."""
 
 
 def usable_cores() -> int:
@@ -96,14 +100,17 @@ def in_processes(
         one_thread_each(),
         ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(start,)) as pool,
     ):
-        parts = [tasks[first : first + chunk] for first in range(0, len(tasks), chunk)]
+        parts = (tasks[first : first + chunk] for first in range(0, len(tasks), chunk))
         try:
-            waiting = deque(pool.submit(_each, run, part) for part in parts)
+            # A few at a time: the pool's thread, when it tells all futures that a process died, must not find
+            # that others join them meanwhile. It may die of that (Python 3.11), and then nothing ends.
+            waiting = deque(pool.submit(_each, run, part) for part in islice(parts, AHEAD * count))
             while waiting:
                 yield from waiting.popleft().result()
+                waiting.extend(pool.submit(_each, run, part) for part in islice(parts, 1))
         except BrokenProcessPool as error:
             # Not `pool.map`, which cancels what is left while the pool tells the same futures that it is
-            # broken: its thread may die of that (Python 3.11), and then nothing ends.
+            # broken: its thread may die of that too.
             raise worker_died(workers) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
