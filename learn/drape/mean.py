@@ -93,5 +93,10 @@ class MeanDrape(nn.Module):
         if mesh.name != self.design:
             raise InputError(f"a garment of design {mesh.name!r}; this network knows {self.design!r}")
         own = template(self.design, mesh.parameters, self.resolution)
-        positions = self(self.parameters_of(mesh.parameters)[None])[0]
-        return correspondence(own, mesh).carry(positions.double().numpy())
+        return correspondence(own, mesh).carry(self.template_of(mesh.parameters))
+
+    @torch.no_grad()
+    def template_of(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        """(V, 3) at the vertices of the template, metres. Raises InputError if a parameter is missing."""
+        positions: NDArray[np.float64] = self(self.parameters_of(values)[None])[0].double().numpy()
+        return positions

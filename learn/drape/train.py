@@ -12,19 +12,18 @@ import torch
 from muslin.garments.errors import InputError
 from muslin.learn.drape.examples import Examples, mean_drapes, read_examples
 from muslin.learn.drape.fabric import FIGURES, fabric_figures, file_stem
+from muslin.learn.drape.fit_mean import fit_mean
 from muslin.learn.drape.garment import PreparedGarment
-from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.drape.network import DrapeNetwork, NetworkConfig
 from muslin.learn.drape.objective import DisplacementObjective, Item
 from muslin.learn.drape.pipeline import ANY_FABRIC, GRAPHS, DrapePipeline
 from muslin.learn.drape.smoothing import LENGTH, Smoother
 from muslin.learn.graph.pyramid import PyramidCache
 from muslin.learn.training.batches import evenly
-from muslin.learn.training.loop import Report, Settings, rate, train
+from muslin.learn.training.loop import Report, Settings, train
 from muslin.learn.training.machine import training_device
 from muslin.sim.dataset.reader import Dataset
 
-MEAN_STEPS, MEAN_RATE, MEAN_DECAY = 1500, 1e-2, 1.0
 MOST_VALIDATED = 64
 """Items of a split that are looked at after each epoch."""
 
@@ -81,7 +80,7 @@ def train_smooth(
     """R_mean and R_smooth from sets["train"], saved into `out`: a pipeline that drapes smooth."""
     own = sets["train"]
     config = NetworkConfig(own.betas, 0, settings.channels, settings.order)
-    mean = train_mean(own, settings.smooth.seed)
+    mean = fit_mean(own.garments[0].name, own.parameters, *mean_drapes(own), settings.smooth.seed)
     cache = PyramidCache(out / GRAPHS, len(settings.channels))
     pipeline = DrapePipeline(own.world, mean, DrapeNetwork(config), {}, settings.skinned, cache)
     items = {name: _smooth_items(pipeline, part, settings.smoothing) for name, part in sets.items()}
@@ -118,25 +117,6 @@ def train_fine(
         pipeline.fine[name] = train_network(config, items, settings.fine, settings.batch, folder, told)
     pipeline.save(out)
     return pipeline
-
-
-def train_mean(examples: Examples, seed: int = 0) -> MeanDrape:
-    """R_mean, in full batches: there are as many drapes as designs."""
-    if not examples.parameters:
-        raise InputError("all garments have the same parameters; R_mean learns from two designs at least")
-    parameters, drapes = mean_drapes(examples)
-    torch.manual_seed(seed)
-    network = MeanDrape(examples.garments[0].name, examples.parameters)
-    network.normalise(parameters, drapes)
-    optimizer = torch.optim.AdamW(network.parameter_groups(MEAN_DECAY), lr=MEAN_RATE)
-    for step in range(MEAN_STEPS):
-        for group in optimizer.param_groups:
-            group["lr"] = MEAN_RATE * rate(step / MEAN_STEPS, 0.0)
-        loss = ((network(parameters) - drapes) / network.spread).square().mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-    return network.eval()
 
 
 def train_network(

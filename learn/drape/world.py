@@ -38,12 +38,7 @@ class World:
 
     def load_body(self) -> BodyModel:
         """Raises InputError if it is not the same model any more."""
-        model = load_body(self.body)
-        if model.digest != self.digest:
-            raise InputError(
-                f"body {self.body!r} is not the one that was learned from; put that file back, or train anew"
-            )
-        return model
+        return same_body(self.body, self.digest)
 
     def check(self, sample: Sample) -> None:
         """Raise InputError for a sample of another world."""
@@ -60,6 +55,16 @@ class World:
                     f"sample {sample.id} has another {what} than what was learned from; select samples "
                     "like that"
                 )
+
+
+def same_body(name: str, digest: str) -> BodyModel:
+    """The body of a name. Raises InputError if it is not the one of this digest."""
+    model = load_body(name)
+    if model.digest != digest:
+        raise InputError(
+            f"body {name!r} is not the one that was learned from; put that file back, or train anew"
+        )
+    return model
 
 
 def in_body_frame(sample: Sample) -> NDArray[np.float32]:

@@ -1,0 +1,1 @@
+"""Animated garments: displacement maps over the uv layout, and diffusion models that draw them."""

@@ -1,0 +1,165 @@
+"""How maps come from noise: what a network learns, and how maps are drawn by it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from diffusers import (
+    DDIMScheduler,
+    DDPMScheduler,
+    DPMSolverMultistepScheduler,
+    FlowMatchEulerDiscreteScheduler,
+)
+from torch import Tensor
+
+from muslin.garments.errors import InputError
+
+KINDS = ("epsilon", "v", "flow", "regression")
+SAMPLERS = {
+    "epsilon": ("ddpm", "ddim", "dpm"),
+    "v": ("ddpm", "ddim", "dpm"),
+    "flow": ("euler",),
+    "regression": ("once",),
+}
+"""Of each kind; the first is the usual one."""
+STEPS = {"ddpm": 100, "ddim": 10, "dpm": 5, "euler": 2, "once": 1}
+"""Usual numbers of them."""
+NOISES = 100
+"""Levels of noise of diffusion, as in the thesis."""
+FLOW_NOISES = 1000
+"""In which the network is told the noise of a flow."""
+FURTHEST = 8.0
+"""Spreads beyond which no value of a map lies; cuts off what division by nearly nothing makes of noise."""
+
+Predict = Callable[[Tensor, Tensor], Tensor]
+"""The network's answer to (x, t), all else fixed."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How maps are drawn: sampler and number of steps, both usual ones if not said; strength: the share of
+    the noise with which the frame before is begun from, 1 being noise alone."""
+
+    sampler: str = ""
+    steps: int = 0
+    strength: float = 1.0
+
+    def of(self, kind: str) -> Drawing:
+        """With what is not said. Raises InputError for a sampler that a kind has not, or wrong numbers."""
+        sampler = self.sampler or SAMPLERS[kind][0]
+        if sampler not in SAMPLERS[kind]:
+            raise InputError(
+                f"sampler {sampler!r}: a model of kind {kind!r} takes {', '.join(SAMPLERS[kind])}"
+            )
+        steps = self.steps or STEPS[sampler]
+        most = {"ddpm": NOISES, "ddim": NOISES, "dpm": NOISES, "euler": FLOW_NOISES, "once": 1}[sampler]
+        if not 1 <= steps <= most:
+            raise InputError(f"{steps} steps: sampler {sampler!r} takes from 1 to {most}")
+        if not 0.0 < self.strength <= 1.0:
+            raise InputError(f"strength = {self.strength:g}: must be above 0, and 1 at most")
+        return Drawing(sampler, steps, self.strength)
+
+
+class Process:
+    """Noisy maps x_t of maps x and noise e of unit variance, and what a network is to say of them.
+
+    | kind | x_t | said |
+    | --- | --- | --- |
+    | epsilon | sqrt(a_t) x + sqrt(1 - a_t) e, a_t by the cosine schedule, 100 levels | e |
+    | v | the same | sqrt(a_t) e - sqrt(1 - a_t) x |
+    | flow | (1 - s) x + s e, t = 1000 s | e - x |
+    | regression | 0, t = 0 | x |
+
+    Sources: Ho et al. 2020, "Denoising Diffusion Probabilistic Models"; Nichol and Dhariwal 2021, "Improved
+    Denoising Diffusion Probabilistic Models" (cosine schedule); Salimans and Ho 2022, "Progressive
+    Distillation for Fast Sampling" (v); Lipman et al. 2023, "Flow Matching for Generative Modeling".
+    """
+
+    def __init__(self, kind: str) -> None:
+        if kind not in KINDS:
+            raise InputError(f"kind {kind!r}: must be one of {', '.join(KINDS)}")
+        self.kind = kind
+        self._options: dict[str, Any] = {
+            "num_train_timesteps": NOISES,
+            "beta_schedule": "squaredcos_cap_v2",
+            "prediction_type": "v_prediction" if kind == "v" else "epsilon",
+        }
+        self._noises = DDPMScheduler(**self._options)
+
+    def times(self, count: int, generator: torch.Generator) -> Tensor:
+        """(count,) t to learn at, random: of diffusion uniform; of a flow s = sigmoid(n), n standard normal
+        (Esser et al. 2024, "Scaling Rectified Flow Transformers"), which sees the middle more."""
+        if self.kind == "flow":
+            return FLOW_NOISES * torch.randn(count, generator=generator).sigmoid()
+        if self.kind == "regression":
+            return torch.zeros(count)
+        return torch.randint(NOISES, (count,), generator=generator)
+
+    def pair(self, x: Tensor, noise: Tensor, t: Tensor) -> tuple[Tensor, Tensor]:
+        """(x_t, what is to be said), each (B, 3, S, S), of x and noise (B, 3, S, S), t (B,)."""
+        if self.kind == "regression":
+            return torch.zeros_like(x), x
+        if self.kind == "flow":
+            s = (t / FLOW_NOISES)[:, None, None, None]
+            return (1.0 - s) * x + s * noise, noise - x
+        noisy = self._noises.add_noise(x, noise, t)
+        return noisy, self._noises.get_velocity(x, noise, t) if self.kind == "v" else noise
+
+    def draw(
+        self,
+        predict: Predict,
+        noise: Tensor,
+        drawing: Drawing,
+        generator: torch.Generator | None = None,
+        before: Tensor | None = None,
+    ) -> Tensor:
+        """x (B, 3, S, S) from noise (B, 3, S, S).
+
+        before: maps of the frame before, from which it begins where the drawing's strength is below 1;
+        generator: of the noise that "ddpm" adds on the way.
+        """
+        asked = drawing.of(self.kind)
+        if asked.sampler == "once":
+            return predict(torch.zeros_like(noise), torch.zeros(len(noise)))
+        scheduler, times = self._scheduler(asked, before is not None)
+        x = noise
+        if before is not None and asked.strength < 1.0:
+            x = self._begun(before, noise, times[0])
+        for t in times:
+            said = predict(x, t.to(torch.float32).expand(len(x)))
+            more = {"generator": generator} if asked.sampler == "ddpm" else {}
+            x = scheduler.step(said, t, x, **more).prev_sample
+        return x
+
+    def _begun(self, before: Tensor, noise: Tensor, t: Tensor) -> Tensor:
+        if self.kind == "flow":
+            return (1.0 - t / FLOW_NOISES) * before + t / FLOW_NOISES * noise
+        return self._noises.add_noise(before, noise, t.expand(len(before)).long())
+
+    def _scheduler(self, asked: Drawing, begun: bool) -> tuple[Any, Tensor]:
+        """Scheduler, and the t at which it steps: all, or of the share `strength` as many."""
+        strength = asked.strength if begun else 1.0
+        if asked.sampler == "euler":
+            flow = FlowMatchEulerDiscreteScheduler(num_train_timesteps=FLOW_NOISES)
+            flow.set_timesteps(sigmas=strength * np.linspace(1.0, 1.0 / asked.steps, asked.steps))
+            return flow, flow.timesteps
+        clip = {"clip_sample": True, "clip_sample_range": FURTHEST}
+        scheduler: Any
+        if asked.sampler == "ddpm":
+            scheduler = DDPMScheduler(**self._options, **clip, timestep_spacing="trailing")
+        elif asked.sampler == "ddim":
+            scheduler = DDIMScheduler(**self._options, **clip, timestep_spacing="trailing")
+        else:
+            scheduler = DPMSolverMultistepScheduler(
+                **self._options, timestep_spacing="trailing", final_sigmas_type="zero"
+            )
+        total = min(NOISES, round(asked.steps / strength))
+        scheduler.set_timesteps(total)
+        first = max(0, total - asked.steps)
+        if asked.sampler == "dpm" and first:
+            scheduler.set_begin_index(first)
+        return scheduler, scheduler.timesteps[first:]
