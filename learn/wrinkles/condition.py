@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -43,13 +44,20 @@ class Condition:
     | fabric | FIGURES | see `fabric_figures` |
 
     So nothing depends on where the body stands or which way it faces. The thesis has shape, pose and design;
-    motion and fabric, without which neither inertia nor another cloth can be told, are options.
+    motion and fabric, without which neither inertia nor another cloth can be told, are options. So are
+    `fields`, which are no part of these numbers: FIELDS more for every place of the cloth.
     """  # noqa: E501
 
     betas: int
     names: tuple[str, ...]
     motion: bool = True
     fabric: bool = False
+    fields: bool = True
+
+    @staticmethod
+    def from_json(values: Mapping[str, Any]) -> Condition:
+        """The inverse of `dataclasses.asdict`, by way of JSON."""
+        return Condition(**{**values, "names": tuple(values["names"])})
 
     @property
     def count(self) -> int:

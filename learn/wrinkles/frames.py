@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from muslin.garments.errors import InputError
+from muslin.garments.mesh import GarmentMesh
 from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.wrinkles.condition import Condition
 from muslin.learn.wrinkles.garment import UnposedGarment, unposed_garment
@@ -19,16 +22,27 @@ from muslin.learn.wrinkles.templates import fit_templates
 from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.reader import Dataset
-from muslin.sim.dataset.sample import Sample
+from muslin.sim.dataset.sample import BodyTrack, Sample
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Conditions (T, C) and fields (T, F, side, side) of the frames of a sequence, see `Condition`."""
+
+    conditions: Tensor
+    fields: Tensor
+
+    def __len__(self) -> int:
+        return len(self.conditions)
 
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """One sequence: maps (T, N, 3), metres, in memory or a file; conditions (T, C)."""
+    """One sequence: maps (T, N, 3), metres, in memory or a file; and what is told of its frames."""
 
     id: str
     maps: NDArray[np.float32]
-    conditions: Tensor
+    told: Told
 
     def __len__(self) -> int:
         return len(self.maps)
@@ -76,22 +90,29 @@ def templates_of(samples: Sequence[Sample], world: SequenceWorld, seed: int = 0)
 class GarmentCache:
     """Unposed garments, each made once a design and triangulation."""
 
-    def __init__(self, network: MeanDrape, world: SequenceWorld, size: int) -> None:
-        self.network, self.body, self.size = network, world.load_body(), size
+    def __init__(self, network: MeanDrape, world: SequenceWorld, size: int, places: int) -> None:
+        self.network, self.world, self.body = network, world, world.load_body()
+        self.size, self.places = size, places
         self._known: dict[str, UnposedGarment] = {}
 
-    def of(self, sample: Sample) -> UnposedGarment:
-        mesh = sample.frame_garment(0)
+    def of(self, mesh: GarmentMesh) -> UnposedGarment:
         key = sha256(mesh.panel_vertices.tobytes() + mesh.panel_faces.tobytes()).hexdigest()
         if key not in self._known:
-            self._known[key] = unposed_garment(mesh, self.network, self.body, self.size)
+            self._known[key] = unposed_garment(mesh, self.network, self.body, self.size, self.places)
         return self._known[key]
+
+
+def told_of(garment: UnposedGarment, track: BodyTrack, fabric: str, condition: Condition, fps: float) -> Told:
+    """What is told of a garment on a moving body."""
+    conditions = condition.of(track, fps, garment.mesh.parameters, fabric)
+    side = garment.places.layout.size
+    fields = garment.fields(track, fps) if condition.fields else np.zeros((len(conditions), 0, side, side))
+    return Told(conditions, torch.from_numpy(fields.astype(np.float32)))
 
 
 def read_clips(
     dataset: Dataset,
     garments: GarmentCache,
-    world: SequenceWorld,
     condition: Condition,
     folder: Path,
     progress: Callable[[float, int, str], None] | None = None,
@@ -101,17 +122,18 @@ def read_clips(
     Raises InputError for a sample of another world.
     """
     durable.make_folder(folder)
+    world = garments.world
     weights = b"".join(value.numpy().tobytes() for value in garments.network.state_dict().values())
     clips = []
     for done, sample in enumerate(dataset):
         track = world.check(sample)
+        garment = garments.of(sample.frame_garment(0))
         key = sha256(weights + sample.positions.tobytes() + str(garments.size).encode()).hexdigest()[:24]
         file = folder / f"{key}.npy"
         if not file.exists():
-            _store(file, garments.of(sample).maps(sample.positions, track))
+            _store(file, garment.maps(sample.positions, track))
         maps = np.load(file, mmap_mode="r")
-        conditions = condition.of(track, world.fps, sample.garment.parameters, sample.fabric)
-        clips.append(Clip(sample.id, maps, conditions))
+        clips.append(Clip(sample.id, maps, told_of(garment, track, sample.fabric, condition, world.fps)))
         if progress is not None:
             progress(done + 1, len(dataset), f"maps of {sample.id}")
     return clips
@@ -124,13 +146,11 @@ def digest_of(clips: Mapping[str, Sequence[Clip]]) -> str:
         sha.update(name.encode())
         for clip in own:
             sha.update(np.ascontiguousarray(clip.maps).data)
-            sha.update(clip.conditions.numpy().tobytes())
+            sha.update(clip.told.conditions.numpy().tobytes() + clip.told.fields.numpy().tobytes())
     return sha.hexdigest()
 
 
 def _store(file: Path, maps: NDArray[np.float32]) -> None:
-    import io
-
     stream = io.BytesIO()
     np.save(stream, maps, allow_pickle=False)
     durable.write_file(file, stream.getvalue())

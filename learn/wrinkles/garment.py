@@ -12,6 +12,7 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.garments.template import template
 from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.wrinkles.codec import MapCodec
+from muslin.learn.wrinkles.fields import motion_fields
 from muslin.learn.wrinkles.layout import map_layout
 from muslin.learn.wrinkles.skin import GarmentSkin, garment_skin
 from muslin.sim.body.model import BodyModel
@@ -21,12 +22,13 @@ from muslin.sim.dataset.sample import BodyTrack
 @dataclass(frozen=True, eq=False)
 class UnposedGarment:
     """x = pose(T + D m): template T (V, 3) of the design, on the mean body in T-pose; displacement D m of the
-    map m; `pose` of the skin."""
+    map m; `pose` of the skin. places: maps of the size of the network's places, for `fields`."""
 
     mesh: GarmentMesh
     template: NDArray[np.float64]
     skin: GarmentSkin
     codec: MapCodec
+    places: MapCodec
 
     def maps(self, positions: NDArray[np.floating], track: BodyTrack) -> NDArray[np.float32]:
         """m (T, N, 3), metres, of positions x (T, V, 3) on a moving body.
@@ -36,21 +38,28 @@ class UnposedGarment:
         apart = self.skin.unposed(positions, track.beta, track.poses, track.translations) - self.template
         return self.codec.encode(apart).astype(np.float32)
 
+    def fields(self, track: BodyTrack, fps: float) -> NDArray[np.float32]:
+        """(T, FIELDS, S, S) `motion_fields` on a moving body, as images of the size of `places`."""
+        told = motion_fields(self.skin, self.template, track, fps)
+        return self.places.layout.image(self.places.encode(told))
+
     def positions(self, maps: NDArray[np.floating], track: BodyTrack) -> NDArray[np.float32]:
         """x (T, V, 3), metres, of maps m (T, N, 3)."""
         moved = self.template + self.codec.decode(maps)
         return self.skin.posed(moved, track.beta, track.poses, track.translations).astype(np.float32)
 
 
-def unposed_garment(mesh: GarmentMesh, network: MeanDrape, body: BodyModel, size: int) -> UnposedGarment:
-    """With the template that the network (G_design) says for the design of a mesh, and maps of a size.
+def unposed_garment(
+    mesh: GarmentMesh, network: MeanDrape, body: BodyModel, size: int, places: int
+) -> UnposedGarment:
+    """With the template that the network (G_design) says for the design of a mesh, and maps of two sizes.
 
     Skin data is that of the network's own triangulation, whatever the mesh: all triangulations of a design
     follow the body alike. Raises InputError for a garment that the network does not know.
     """
-    codec = MapCodec(map_layout(network.design, size), mesh)
+    codec, coarse = (MapCodec(map_layout(network.design, texels), mesh) for texels in (size, places))
     own = template(network.design, mesh.parameters, network.resolution)
     positions = network.template_of(mesh.parameters)
     place = correspondence(own, mesh)
     skin = garment_skin(own, positions, body).carried(place)
-    return UnposedGarment(mesh, place.carry(positions), skin, codec)
+    return UnposedGarment(mesh, place.carry(positions), skin, codec, coarse)

@@ -46,6 +46,17 @@ class MapLayout:
         """(size, size): place of each texel among those of the mask, row by row; -1 outside."""
         return np.where(self.mask, np.cumsum(self.mask).reshape(self.islands.shape) - 1, -1)
 
+    def image(self, values: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(..., C, size, size) with values (..., N, C) at the texels of the mask and 0 elsewhere."""
+        shape = *values.shape[:-2], values.shape[-1], self.size, self.size
+        found = np.zeros(shape, dtype=np.float32)
+        found[..., self.mask] = np.swapaxes(values, -1, -2)
+        return found
+
+    def values(self, image: NDArray[np.floating]) -> NDArray[np.floating]:
+        """The inverse of `image`: (..., N, C) of an image (..., C, size, size)."""
+        return np.swapaxes(image[..., self.mask], -1, -2)
+
     def bilinear(self, uv: NDArray[np.float64]) -> csr_array:
         """(P, N): takes values of the mask's texels to points uv (P, 2) by bilinear interpolation.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from diffusers import UNet2DModel
@@ -24,13 +26,14 @@ FURTHEST = 3.0
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """size: of maps; patch: texels a side that are one place of the U-Net; channels: of its levels; layers:
-    residual layers a level; attention: levels that have it; conditions: numbers of a condition; previous:
-    whether it sees the map of the frame before."""
+    """size: of maps; conditions: numbers of a condition; fields: numbers that each place is told; previous:
+    whether it sees the map of the frame before; patch: texels a side that are one place of the U-Net;
+    channels: of its levels; layers: residual layers a level; attention: levels that have it."""
 
     design: str
     size: int
     conditions: int
+    fields: int
     previous: bool
     patch: int = 4
     channels: tuple[int, ...] = (64, 96, 128)
@@ -45,6 +48,17 @@ class NetworkConfig:
                 f"multiple of {step}"
             )
 
+    @staticmethod
+    def from_json(values: Mapping[str, Any]) -> NetworkConfig:
+        """The inverse of `dataclasses.asdict`, by way of JSON."""
+        lists = {name: tuple(values[name]) for name in ("channels", "attention")}
+        return NetworkConfig(**{**values, **lists})
+
+    @property
+    def side(self) -> int:
+        """Places of the U-Net along a side of the map."""
+        return self.size // self.patch
+
 
 SIZES: dict[str, dict[str, object]] = {
     "tiny": {"patch": 4, "channels": (32, 32)},
@@ -55,13 +69,33 @@ SIZES: dict[str, dict[str, object]] = {
 """Of networks: 0.4, 3.7, 7.6 and 113.8 million weights. The last is that of the thesis, chapter 5."""
 
 
-class WrinkleNetwork(nn.Module):
-    """F(x, t | c, m'): x the noisy map, t how noisy, c the condition, m' the map of the frame before.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a network is told of B frames: conditions (B, C); fields (B, F, side, side); previous
+    (B, 3, S, S), the map of the frame before, in units of `spread`; and whether it is known, 1 or 0, (B,)."""
 
-    diffusers' U-Net on patches of texels, [x, m', whether m' is known, the mask, learned channels of place];
-    c, over its spread, through two layers of HIDDEN is added to the embedding of t. Maps are in units of
-    `spread`, 0 outside of the mask. Source: Vidaurre 2024, chapter 5; the patches (Peebles and Xie 2023,
-    "Scalable Diffusion Models with Transformers"), the mask and places are ours.
+    conditions: Tensor
+    fields: Tensor
+    previous: Tensor
+    known: Tensor
+
+    def to(self, device: torch.device) -> Seen:
+        return Seen(
+            self.conditions.to(device),
+            self.fields.to(device),
+            self.previous.to(device),
+            self.known.to(device),
+        )
+
+
+class WrinkleNetwork(nn.Module):
+    """F(x, t | c, f, m'): x the noisy map, t how noisy, c the condition, f the fields, m' the map of the
+    frame before.
+
+    diffusers' U-Net on patches of texels, [x, f, m', whether m' is known, the mask, learned channels of
+    place]; c, over its spread, through two layers of HIDDEN is added to the embedding of t. Maps are in units
+    of `spread`, 0 outside of the mask. Source: Vidaurre 2024, chapter 5; the fields, the patches (Peebles and
+    Xie 2023, "Scalable Diffusion Models with Transformers"), the mask and places are ours.
     """
 
     centre: Tensor
@@ -73,12 +107,11 @@ class WrinkleNetwork(nn.Module):
         super().__init__()
         self.config = config
         texels = config.patch**2
-        side = config.size // config.patch
         levels = range(len(config.channels))
-        channels = 3 * texels * (1 + config.previous) + config.previous + texels + PLACES
+        channels = 3 * texels * (1 + config.previous) + config.previous + texels + config.fields + PLACES
         embedding = 4 * config.channels[0]
         self.unet = UNet2DModel(
-            sample_size=side,
+            sample_size=config.side,
             in_channels=channels,
             out_channels=3 * texels,
             block_out_channels=config.channels,
@@ -95,7 +128,7 @@ class WrinkleNetwork(nn.Module):
         self.embed = nn.Sequential(
             nn.Linear(config.conditions, HIDDEN), nn.SiLU(), nn.Linear(HIDDEN, embedding)
         )
-        self.places = nn.Parameter(0.1 * torch.randn(1, PLACES, side, side))
+        self.places = nn.Parameter(0.1 * torch.randn(1, PLACES, config.side, config.side))
         self.register_buffer("centre", torch.zeros(config.conditions))
         self.register_buffer("width", torch.ones(config.conditions))
         self.register_buffer("spread", torch.ones(()))
@@ -108,28 +141,17 @@ class WrinkleNetwork(nn.Module):
         self.width.copy_(conditions.std(0, correction=0).clamp_min(NARROWEST))
         self.spread.fill_(spread)
 
-    def forward(
-        self,
-        x: Tensor,
-        t: Tensor,
-        condition: Tensor,
-        previous: Tensor | None = None,
-        known: Tensor | None = None,
-    ) -> Tensor:
-        """(B, 3, S, S) of x (B, 3, S, S), t (B,), condition (B, C), and, where the network sees it, the map
-        before (B, 3, S, S) and whether it is known, 1 or 0, (B,); all maps in units of `spread`."""
-        patch = self.config.patch
+    def forward(self, x: Tensor, t: Tensor, seen: Seen) -> Tensor:
+        """(B, 3, S, S) of x (B, 3, S, S) and t (B,); all maps in units of `spread`."""
+        patch, side = self.config.patch, self.config.side
         count = len(x)
-        side = self.config.size // patch
-        parts = [pixel_unshuffle(x, patch)]
+        parts = [pixel_unshuffle(x, patch), seen.fields]
         if self.config.previous:
-            assert previous is not None
-            assert known is not None
-            told = known[:, None, None, None]
-            parts += [pixel_unshuffle(previous * told, patch), told.expand(count, 1, side, side)]
+            told = seen.known[:, None, None, None]
+            parts += [pixel_unshuffle(seen.previous * told, patch), told.expand(count, 1, side, side)]
         mask = pixel_unshuffle(self.mask, patch)
         parts += [mask.expand(count, -1, -1, -1), self.places.expand(count, -1, -1, -1)]
-        q = ((condition - self.centre) / self.width).clamp(-FURTHEST, FURTHEST)
+        q = ((seen.conditions - self.centre) / self.width).clamp(-FURTHEST, FURTHEST)
         drawn = self.unet(torch.cat(parts, dim=1), t, class_labels=self.embed(q)).sample
         out: Tensor = pixel_shuffle(drawn, patch) * self.mask
         return out

@@ -114,13 +114,13 @@ class Process:
         predict: Predict,
         noise: Tensor,
         drawing: Drawing,
-        generator: torch.Generator | None = None,
+        generators: list[torch.Generator] | None = None,
         before: Tensor | None = None,
     ) -> Tensor:
         """x (B, 3, S, S) from noise (B, 3, S, S).
 
         before: maps of the frame before, from which it begins where the drawing's strength is below 1;
-        generator: of the noise that "ddpm" adds on the way.
+        generators: B of them, of the noise that "ddpm" adds on the way.
         """
         asked = drawing.of(self.kind)
         if asked.sampler == "once":
@@ -131,7 +131,7 @@ class Process:
             x = self._begun(before, noise, times[0])
         for t in times:
             said = predict(x, t.to(torch.float32).expand(len(x)))
-            more = {"generator": generator} if asked.sampler == "ddpm" else {}
+            more = {"generator": generators} if asked.sampler == "ddpm" else {}
             x = scheduler.step(said, t, x, **more).prev_sample
         return x
 

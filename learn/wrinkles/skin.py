@@ -46,7 +46,7 @@ class GarmentSkin:
     ) -> Floats:
         """y (T, V, 3) of points x (T, V, 3), or (V, 3) in all frames; beta (n,), theta (T, 24, 3),
         translation (T, 3); metres, radians."""
-        linear, shift, offsets = self._motion(beta, theta, translation)
+        linear, shift, offsets = self.motion(beta, theta, translation)
         return _times(linear, points + offsets) + shift
 
     def unposed(
@@ -56,7 +56,7 @@ class GarmentSkin:
 
         Raises InputError where it has none: joints turned against each other by nearly half a turn.
         """
-        linear, shift, offsets = self._motion(beta, theta, translation)
+        linear, shift, offsets = self.motion(beta, theta, translation)
         least = np.linalg.det(linear)
         if least.min() < SMALLEST_DETERMINANT:
             frame, vertex = np.unravel_index(int(least.argmin()), least.shape)
@@ -72,8 +72,8 @@ class GarmentSkin:
             self.model, place.carry(self.weights), place.carry(self.shape), place.carry(self.pose)
         )
 
-    def _motion(
-        self, beta: ArrayLike, theta: ArrayLike, translation: ArrayLike
+    def motion(
+        self, beta: ArrayLike, theta: ArrayLike, translation: ArrayLike = 0.0
     ) -> tuple[Floats, Floats, Floats]:
         """M (T, V, 3, 3), t (T, V, 3), and what is added to x (T, V, 3)."""
         theta = np.asarray(theta, dtype=np.float64)

@@ -1,0 +1,129 @@
+"""What the network of displacement maps learns, and how well it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from muslin.learn.training.batches import ShuffledBatches, evenly
+from muslin.learn.wrinkles.degrade import Degrading
+from muslin.learn.wrinkles.frames import Clip, digest_of
+from muslin.learn.wrinkles.layout import MapLayout
+from muslin.learn.wrinkles.network import Seen, WrinkleNetwork
+from muslin.learn.wrinkles.process import Drawing, Process
+from muslin.learn.wrinkles.rollout import draw
+
+MOST_VALIDATED = 32
+"""Frames of a split on which the error is logged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Noisy maps x (B, 3, S, S) at t (B,), what is seen beside them, and what is to be said of them."""
+
+    x: Tensor
+    t: Tensor
+    seen: Seen
+    target: Tensor
+
+
+class Frames:
+    """Frames of sequences by their place in one row of all; `spread`, metres, is the unit of maps."""
+
+    def __init__(self, clips: Sequence[Clip], layout: MapLayout, spread: float) -> None:
+        self.clips, self.layout, self.spread = clips, layout, spread
+        self._starts = np.cumsum([0, *(len(clip) for clip in clips)])
+
+    def __len__(self) -> int:
+        return int(self._starts[-1])
+
+    def read(self, places: Sequence[int] | NDArray[np.int64]) -> tuple[Tensor, Seen]:
+        """Maps (B, 3, S, S) of frames, and what is seen of them; in a first frame the map before is not
+        known."""
+        maps, before, conditions, fields, known = [], [], [], [], []
+        for place in places:
+            index = int(np.searchsorted(self._starts, place, side="right")) - 1
+            clip, k = self.clips[index], int(place - self._starts[index])
+            maps.append(clip.maps[k])
+            before.append(clip.maps[max(k - 1, 0)])
+            conditions.append(clip.told.conditions[k])
+            fields.append(clip.told.fields[k])
+            known.append(float(k > 0))
+        seen = Seen(torch.stack(conditions), torch.stack(fields), self._images(before), torch.tensor(known))
+        return self._images(maps), seen
+
+    def _images(self, maps: Sequence[NDArray[np.float32]]) -> Tensor:
+        return torch.from_numpy(self.layout.image(np.stack(maps)) / np.float32(self.spread))
+
+
+class WrinkleObjective:
+    """Mean square, over texels of the mask, of what the network says wrong of noisy maps (see `Process`)."""
+
+    def __init__(
+        self,
+        sets: Mapping[str, Sequence[Clip]],
+        layout: MapLayout,
+        spread: float,
+        process: Process,
+        degrading: Degrading,
+        batch: int,
+        seed: int,
+    ) -> None:
+        """sets: "train", and others on which errors are logged."""
+        self.sets = {name: Frames(clips, layout, spread) for name, clips in sets.items()}
+        self.process, self.degrading, self.seed = process, degrading, seed
+        self.mask = torch.from_numpy(layout.mask).float()
+        self._order = ShuffledBatches(len(self.sets["train"]), batch, seed)
+
+    def steps(self) -> int:
+        return self._order.steps
+
+    def batches(self, epoch: int, rank: int, world: int) -> Iterator[Batch]:
+        generator = torch.Generator()
+        generator.manual_seed(int(np.random.SeedSequence([self.seed, epoch, rank]).generate_state(1)[0]))
+        for places in self._order.places(epoch, rank, world):
+            maps, seen = self.sets["train"].read(places)
+            previous = self.degrading(seen.previous, self.mask, generator)
+            kept = torch.rand(len(places), generator=generator) >= self.degrading.unknown
+            seen = Seen(seen.conditions, seen.fields, previous, seen.known * kept)
+            yield self.noisy(maps, seen, generator)
+
+    def noisy(self, maps: Tensor, seen: Seen, generator: torch.Generator) -> Batch:
+        """A batch of maps (B, 3, S, S) with random noise at random levels."""
+        t = self.process.times(len(maps), generator)
+        noise = torch.randn(maps.shape, generator=generator) * self.mask
+        x, target = self.process.pair(maps, noise, t)
+        return Batch(x, t, seen, target)
+
+    def loss(self, model: nn.Module, batch: Batch) -> Tensor:
+        device = next(model.parameters()).device
+        said = model(batch.x.to(device), batch.t.to(device), batch.seen.to(device))
+        # Both are 0 outside of the mask.
+        wrong = (said - batch.target.to(device)).square().sum()
+        return wrong / (len(said) * said.shape[1] * self.mask.sum())
+
+    def validate(self, model: nn.Module) -> dict[str, float]:
+        """Of some frames of each set the mean length of what is wrong in a texel, mm, drawn from one noise in
+        the usual number of steps, seeing the true map of the frame before."""
+        assert isinstance(model, WrinkleNetwork)
+        found = {}
+        for name, frames in self.sets.items():
+            maps, seen = frames.read(evenly(len(frames), MOST_VALIDATED))
+            drawn = draw(model, self.process, seen, [(k,) for k in range(len(maps))], Drawing())
+            wrong = torch.linalg.vector_norm((drawn.cpu() - maps) * self.mask, dim=1).sum((1, 2))
+            found[f"error_mm.{name}"] = 1000.0 * frames.spread * float((wrong / self.mask.sum()).mean())
+        return found
+
+    def identity(self) -> Mapping[str, Any]:
+        return {
+            "data": digest_of({name: frames.clips for name, frames in self.sets.items()}),
+            "process": self.process.kind,
+            "degrading": vars(self.degrading),
+            "batch": self._order.batch,
+        }
