@@ -7,21 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
 from muslin.garments.merge import merge_meshes
 from muslin.garments.mesh import GarmentMesh
 from muslin.sim.body.load import load_body
-from muslin.sim.body.model import BodyModel
+from muslin.sim.body_motion import scene_beta, scene_motion
 from muslin.sim.budget import with_budget
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.device import open_device
 from muslin.sim.failure import stopped
-from muslin.sim.motion.arms import spread_arms
-from muslin.sim.motion.grounding import fit_to_body
-from muslin.sim.motion.motion import Motion
-from muslin.sim.motion_table import read_motion
 from muslin.sim.recording import Recording
 from muslin.sim.relax import settle
 from muslin.sim.remesh.in_loop import Remesher
@@ -92,10 +87,10 @@ def _simulated_chain(scenes: Sequence[Scene], device: str, progress: Progress | 
     mesh = merge_meshes([g.name for g in garments], [g.mesh for g in garments])
     model = load_body(first.body.model)
     started = time.perf_counter()
-    clip = None if first.motion is None else _clip(first, model)
+    clip = None if first.motion is None else scene_motion(first, model)
     contact, solver = settings_of(first)
     meshes, cloths = [g.mesh for g in garments], [g.cloth for g in garments]
-    beta = _beta(first, model)
+    beta = scene_beta(first, model)
     try:
         worn = WornGarment(meshes, cloths, model, beta, contact, solver, device, work.tick)
     except SimulationError as error:
@@ -153,19 +148,9 @@ def _steps_guess(scene: Scene) -> int:
     )
 
 
-def _beta(scene: Scene, model: BodyModel) -> NDArray[np.float64]:
-    assert scene.body is not None
-    given = scene.body.beta
-    if len(given) > model.num_betas:
-        raise InputError(
-            f"body.beta holds {len(given)} values; body {model.name!r} has {model.num_betas}: give no more"
-        )
-    return np.array([*given, *np.zeros(model.num_betas - len(given))])
-
-
 def _drape(scene: Scene, mesh: GarmentMesh, worn: WornGarment, work: _Work, started: float) -> Sample:
     assert scene.body is not None
-    beta = _beta(scene, worn.model)
+    beta = scene_beta(scene, worn.model)
     pose = a_pose() if scene.body.pose == "a" else np.zeros((24, 3))
     next_step = with_budget(worn.sim, scene.solver.max_work, work.tick)
     try:
@@ -187,13 +172,3 @@ def _shared(scene: Scene) -> dict[str, object]:
     body = None if scene.body is None else scene.body.model
     own = {"name", "motion", "seed", "expect", "body", "colliders", "pins", "sequence"}
     return {"body.model": body, **{key: getattr(scene, key) for key in Scene.model_fields if key not in own}}
-
-
-def _clip(scene: Scene, model: BodyModel) -> Motion:
-    """The motion of a scene on its body."""
-    assert scene.motion is not None
-    m = scene.motion
-    beta = _beta(scene, model)
-    clip = fit_to_body(read_motion(m), model, beta)
-    clip = clip.clip(m.start, clip.duration if m.end is None else m.end)
-    return spread_arms(clip, model, beta)[0] if m.spread_arms else clip

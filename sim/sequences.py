@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from muslin.garments.mesh import GarmentMesh
+from muslin.sim.body_motion import clip_times
 from muslin.sim.budget import with_budget
 from muslin.sim.dataset.sample import Sample
 from muslin.sim.failure import stopped
@@ -116,8 +117,7 @@ def _path(clip: Motion, worn: WornGarment, fps: float, substeps: int) -> Iterato
     before = len(way_in.poses) - 1
     for k in range(1, before + 1):
         yield k - before, (way_in.poses[k], way_in.translations[k])
-    frames = int(np.floor(clip.duration * fps + 1e-6)) + 1
-    poses, translations = clip.at(np.arange((frames - 1) * substeps + 1) / rate)
+    poses, translations = clip.at(clip_times(clip, fps, substeps))
     for k in range(1, len(poses)):
         yield k, (poses[k], translations[k])
 

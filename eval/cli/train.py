@@ -129,6 +129,60 @@ def fine(
 
 
 @train.command()
+def wrinkles(
+    dataset: Annotated[str, typer.Option("--dataset", metavar="DIR", help="Sequences: a folder or a URL.")],
+    out: Out,
+    epochs: Epochs = 40,
+    kind: Annotated[
+        str, typer.Option("--kind", help="temporal (sees the frame before) or static.")
+    ] = "temporal",
+    process: Annotated[
+        str, typer.Option("--process", help="epsilon or v (diffusion), flow, or regression (one step).")
+    ] = "flow",
+    network: Annotated[
+        str, typer.Option("--network", help="tiny, small, medium or thesis: 0.4 to 114 million weights.")
+    ] = "small",
+    size: Annotated[int, typer.Option("--size", help="Texels along a side of the maps.")] = 128,
+    pose: Annotated[bool, typer.Option("--pose/--no-pose", help="Told the pose of the body.")] = True,
+    motion: Annotated[
+        bool, typer.Option("--motion/--no-motion", help="Told how fast the body moves and turns.")
+    ] = True,
+    fields: Annotated[
+        bool, typer.Option("--fields/--no-fields", help="Told at every place what acts on the cloth there.")
+    ] = True,
+    fabric_input: Annotated[bool, typer.Option("--fabric-input", help="Told the fabric.")] = False,
+    batch: Annotated[int, typer.Option("--batch", min=1, help="Frames in a batch.")] = 8,
+    learning_rate: Rate = 1e-3,
+    precision: Precision = "no",
+    seed: Seed = 0,
+) -> None:
+    """Train a network that draws the displacement maps of animated garments, on the split "train".
+
+    Stop it at any moment; the same command goes on. DIR/train has logs for TensorBoard, loss curves and
+    pictures.
+
+    \b
+    Examples:
+      muslin train wrinkles --dataset out/thesis_animated --out out/temporal
+      muslin train wrinkles --dataset out/thesis_animated --kind static --process epsilon --out out/static
+      muslin train wrinkles --dataset out/thesis_animated --network thesis --process epsilon --no-motion \\
+        --no-fields --out out/thesis
+    """
+    from muslin.learn.wrinkles.train import WrinkleSettings, train_wrinkles
+    from muslin.sim.dataset.reader import open_dataset
+
+    if kind not in ("temporal", "static"):
+        raise InputError(f"--kind {kind}: must be temporal or static")
+    settings = WrinkleSettings(
+        _settings(epochs, learning_rate, precision, seed),
+        kind == "temporal", process, network, size, pose, motion, fabric_input, fields, batch,
+    )  # fmt: skip
+    with _stages() as stage:
+        model = train_wrinkles(open_dataset(dataset), out, settings, stage)
+    _tell(out, [model.network])
+
+
+@train.command()
 def collisions(
     model: Annotated[Path, typer.Argument(metavar="MODEL_DIR", help="A pipeline of `muslin train drape`.")],
     dataset: DrapesOf,

@@ -36,10 +36,17 @@ class BodySurface:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Distances (P,) of points (P, 3) to the body, negative inside, metres, its nearest points (P, 3) and
         its normals there (P, 3), those of `igl.signed_distance`."""
-        distances, _, found, normals = igl.signed_distance(
-            np.ascontiguousarray(points, dtype=np.float64),
-            self.vertices(beta),
-            self.faces,
-            sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
-        )
-        return distances, found, normals
+        return nearest_on(points, self.vertices(beta), self.faces)
+
+
+def nearest_on(
+    points: NDArray[np.floating], vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """`BodySurface.nearest` of any surface: vertices (N, 3), metres, and faces (M, 3)."""
+    distances, _, found, normals = igl.signed_distance(
+        np.ascontiguousarray(points, dtype=np.float64),
+        np.ascontiguousarray(vertices),
+        faces,
+        sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
+    )
+    return distances, found, normals

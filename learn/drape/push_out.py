@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Generic
 
 import numpy as np
@@ -24,6 +25,12 @@ LENGTH = 0.015
 MOST_ROUNDS = 20
 
 
+Nearest = Callable[
+    [NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+]
+"""Distances (P,), nearest points (P, 3) and normals there (P, 3), see `BodySurface.nearest`."""
+
+
 class PushOut:
     """For one mesh: with A of `smoothing_matrix`, the displacement d of least d^T A d in which every vertex i
     that was inside goes to its place outside,
@@ -34,16 +41,15 @@ class PushOut:
     which that brings into the body join them, and so on until there is none.
     """
 
-    def __init__(self, mesh: GarmentMesh, body: BodySurface) -> None:
-        self.body = body
+    def __init__(self, mesh: GarmentMesh) -> None:
         self._factors = splu(smoothing_matrix(*sewn_operators(mesh), LENGTH))
 
-    def __call__(self, x: NDArray[np.floating], beta: Any) -> NDArray[np.float64]:
-        """Positions (V, 3) from positions x on a body of shape beta (n,), metres."""
+    def __call__(self, x: NDArray[np.floating], nearest_of: Nearest) -> NDArray[np.float64]:
+        """Positions (V, 3) from positions x, metres; nearest_of: the body's, of points (P, 3)."""
         start = np.asarray(x, dtype=np.float64)
         moved, target = start, np.full_like(start, np.nan)
         for _ in range(MOST_ROUNDS):
-            distances, nearest, normals = self.body.nearest(moved, beta)
+            distances, nearest, normals = nearest_of(moved)
             inside = np.flatnonzero(distances < 0.0)
             if not len(inside):
                 break
@@ -68,13 +74,14 @@ class PushedOut(Generic[Prepared]):
         return self.draper.world
 
     def prepare(self, mesh: GarmentMesh) -> tuple[Prepared, PushOut]:
-        return self.draper.prepare(mesh), PushOut(mesh, self.body)
+        return self.draper.prepare(mesh), PushOut(mesh)
 
     def drapes(
         self, garments: Sequence[tuple[Prepared, PushOut]], betas: Sequence[Any], fabrics: Sequence[str]
     ) -> list[Tensor]:
         said = self.draper.drapes([garment for garment, _ in garments], betas, fabrics)
         moved = [
-            push(drape.numpy(), beta) for (_, push), drape, beta in zip(garments, said, betas, strict=True)
+            push(drape.numpy(), partial(self.body.nearest, beta=beta))
+            for (_, push), drape, beta in zip(garments, said, betas, strict=True)
         ]
         return [torch.from_numpy(drape.astype(np.float32)) for drape in moved]

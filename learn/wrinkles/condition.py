@@ -50,6 +50,7 @@ class Condition:
 
     betas: int
     names: tuple[str, ...]
+    pose: bool = True
     motion: bool = True
     fabric: bool = False
     fields: bool = True
@@ -63,7 +64,8 @@ class Condition:
     def count(self) -> int:
         """Numbers in all."""
         moving = 6 + 3 * len(JOINTS) if self.motion else 0
-        return self.betas + len(self.names) + 3 + 6 * len(JOINTS) + moving + FIGURES * self.fabric
+        posed = self.pose * (3 + 6 * len(JOINTS))
+        return self.betas + len(self.names) + posed + moving + FIGURES * self.fabric
 
     def of(self, track: BodyTrack, fps: float, parameters: Mapping[str, float], fabric: str) -> Tensor:
         """(T, count) of every frame of a moving body. Raises InputError for a missing design parameter."""
@@ -72,7 +74,9 @@ class Condition:
             raise InputError(f"design parameter {missing[0]!r} is missing; give {', '.join(self.names)}")
         design = [DECIMETRES * parameters[name] for name in self.names]
         constant = [shape_tensor(track.beta, self.betas), torch.tensor(design, dtype=torch.float32)]
-        frames = [pose_features(track.poses)]
+        frames = [np.zeros((len(track.poses), 0))]
+        if self.pose:
+            frames.append(pose_features(track.poses))
         if self.motion:
             frames.append(motion_features(track.poses, track.translations, fps))
         moving = torch.from_numpy(np.concatenate(frames, axis=1).astype(np.float32))

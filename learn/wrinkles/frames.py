@@ -114,25 +114,22 @@ def read_clips(
     dataset: Dataset,
     garments: GarmentCache,
     condition: Condition,
-    folder: Path,
+    folder: Path | None = None,
     progress: Callable[[float, int, str], None] | None = None,
 ) -> list[Clip]:
-    """Every sequence of a dataset, its maps kept in `folder`, from where they are read when asked for again.
+    """Every sequence of a dataset; its maps, with a folder, kept there and read when asked for again.
 
     Raises InputError for a sample of another world.
     """
-    durable.make_folder(folder)
     world = garments.world
-    weights = b"".join(value.numpy().tobytes() for value in garments.network.state_dict().values())
     clips = []
     for done, sample in enumerate(dataset):
         track = world.check(sample)
         garment = garments.of(sample.frame_garment(0))
-        key = sha256(weights + sample.positions.tobytes() + str(garments.size).encode()).hexdigest()[:24]
-        file = folder / f"{key}.npy"
-        if not file.exists():
-            _store(file, garment.maps(sample.positions, track))
-        maps = np.load(file, mmap_mode="r")
+        if folder is None:
+            maps = garment.maps(sample.positions, track)
+        else:
+            maps = _kept_maps(garment, sample, track, folder, garments.network)
         clips.append(Clip(sample.id, maps, told_of(garment, track, sample.fabric, condition, world.fps)))
         if progress is not None:
             progress(done + 1, len(dataset), f"maps of {sample.id}")
@@ -150,7 +147,17 @@ def digest_of(clips: Mapping[str, Sequence[Clip]]) -> str:
     return sha.hexdigest()
 
 
-def _store(file: Path, maps: NDArray[np.float32]) -> None:
-    stream = io.BytesIO()
-    np.save(stream, maps, allow_pickle=False)
-    durable.write_file(file, stream.getvalue())
+def _kept_maps(
+    garment: UnposedGarment, sample: Sample, track: BodyTrack, folder: Path, templates: MeanDrape
+) -> NDArray[np.float32]:
+    """Maps from a file whose name says of what they are, made first if it is not there."""
+    weights = b"".join(value.numpy().tobytes() for value in templates.state_dict().values())
+    size = str(garment.codec.layout.size).encode()
+    file = folder / f"{sha256(weights + sample.positions.tobytes() + size).hexdigest()[:24]}.npy"
+    if not file.exists():
+        durable.make_folder(folder)
+        stream = io.BytesIO()
+        np.save(stream, garment.maps(sample.positions, track), allow_pickle=False)
+        durable.write_file(file, stream.getvalue())
+    maps: NDArray[np.float32] = np.load(file, mmap_mode="r")
+    return maps

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from muslin.garments.errors import InputError
 from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.training.checkpoint import read_tensors, write_tensors
 from muslin.learn.wrinkles.condition import Condition
@@ -22,6 +23,8 @@ from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.dataset import durable
 
 TEMPLATES, WRINKLES = "templates.safetensors", "wrinkles.safetensors"
+SHIPPED = Path(__file__).parent / "assets" / "tee"
+"""A model that comes with the package; its model card is beside it."""
 
 
 @dataclass(eq=False)
@@ -65,8 +68,15 @@ class WrinkleModel:
         write_tensors(folder / WRINKLES, weights, {"config": asdict(self.network.config), **kind})
 
 
+def holds_wrinkles(folder: Path) -> bool:
+    """Whether a folder is one of `WrinkleModel.save`."""
+    return (folder / WRINKLES).exists()
+
+
 def load_wrinkles(folder: Path) -> WrinkleModel:
     """The model of a folder, on the CPU. Raises InputError if a file is missing or damaged."""
+    if not holds_wrinkles(folder):
+        raise InputError(f"{folder}: holds no model of animated garments; train one: `muslin train wrinkles`")
     tensors, told = read_tensors(folder / TEMPLATES)
     templates = MeanDrape(told["design"], told["names"], told["resolution"])
     templates.load_state_dict(tensors)

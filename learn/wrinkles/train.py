@@ -43,6 +43,7 @@ class WrinkleSettings:
     process: str = "flow"
     network: str = "small"
     size: int = 128
+    pose: bool = True
     motion: bool = True
     fabric: bool = False
     fields: bool = True
@@ -71,7 +72,9 @@ def train_wrinkles(
     samples = list(own)
     templates = templates_of(samples, world, seed)
     names = varied_parameters(samples)
-    condition = Condition(used_betas(samples), names, settings.motion, settings.fabric, settings.fields)
+    condition = Condition(
+        used_betas(samples), names, settings.pose, settings.motion, settings.fabric, settings.fields
+    )
     process = Process(settings.process)
     torch.manual_seed(seed)
     network = WrinkleNetwork(

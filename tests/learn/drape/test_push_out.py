@@ -1,3 +1,5 @@
+from functools import partial
+
 import igl
 import numpy as np
 import pytest
@@ -41,7 +43,7 @@ def test_all_is_outside_and_what_is_far_stays(body: BodySurface, mesh, pressed: 
     before, *_ = body.nearest(pressed, BETA)
     inside = before < 0.0
     assert 5 < inside.sum() < 200
-    moved = PushOut(mesh, body)(pressed, BETA)
+    moved = PushOut(mesh)(pressed, partial(body.nearest, beta=BETA))
     winding = igl.fast_winding_number(body.vertices(BETA), body.faces, moved)
     assert (winding < 0.5).all()
     after, *_ = body.nearest(moved, BETA)
@@ -57,11 +59,11 @@ def test_all_is_outside_and_what_is_far_stays(body: BodySurface, mesh, pressed: 
 
 def test_cloth_that_is_outside_is_left_alone(body: BodySurface, mesh, pressed: np.ndarray) -> None:
     away = pressed + np.array([0.0, 0.0, 0.05])
-    assert np.array_equal(PushOut(mesh, body)(away, BETA), away)
+    assert np.array_equal(PushOut(mesh)(away, partial(body.nearest, beta=BETA)), away)
 
 
 def test_it_is_the_least_displacement(body: BodySurface, mesh, pressed: np.ndarray) -> None:
-    moved = PushOut(mesh, body)(pressed, BETA)
+    moved = PushOut(mesh)(pressed, partial(body.nearest, beta=BETA))
     matrix = smoothing_matrix(*sewn_operators(mesh), LENGTH)
     forces = np.linalg.norm(matrix @ (moved - pressed), axis=1)
     before, *_ = body.nearest(pressed, BETA)
