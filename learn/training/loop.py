@@ -79,11 +79,14 @@ def train(
     out: Path,
     *,
     report: Report | None = None,
+    after: Callable[[nn.Module, int], None] | None = None,
 ) -> list[dict[str, float]]:
     """Train a model; return a row of figures for every epoch, and before them one for what it was (epoch 0).
 
     Every CHECKPOINT_S seconds and at the end `out` gets a checkpoint, from which the same call goes on to the
     same weights, the history as lines of JSON, and logs for TensorBoard; at the end the loss curve too.
+
+    after: called with the model, in evaluation mode, and the number of epochs that are done, after each.
 
     Raises InputError if `out` holds another training, and if the loss is not finite.
     """
@@ -125,6 +128,8 @@ def train(
         if accelerator.is_main_process:
             progress.history.append(row)
             progress.epochs = epoch + 1
+            if after is not None:
+                after(accelerator.unwrap_model(wrapped), epoch + 1)
             if time.monotonic() - kept > CHECKPOINT_S or progress.epochs == settings.epochs:
                 _keep(out, accelerator.unwrap_model(wrapped), optimizer.optimizer, progress, run, stored)
                 kept, stored = time.monotonic(), len(progress.history)

@@ -10,8 +10,9 @@ import torch
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
+from muslin.learn.wrinkles.clips import Clip, Told, read_clips
 from muslin.learn.wrinkles.condition import Condition
-from muslin.learn.wrinkles.frames import Clip, GarmentCache, Told, read_clips
+from muslin.learn.wrinkles.garment import GarmentCache
 from muslin.learn.wrinkles.model import WrinkleModel
 from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.dataset.reader import Dataset
@@ -62,11 +63,11 @@ class NearestFrame:
 
     def maps(self, sequences: Sequence[Told], seed: int = 0) -> list[NDArray[np.float32]]:
         width = self.model.network.width
-        known = torch.cat([clip.told.conditions for clip in self.clips]) / width
+        known = torch.from_numpy(np.concatenate([clip.told.conditions for clip in self.clips])) / width
         frames = [(clip, t) for clip in self.clips for t in range(len(clip))]
         found = []
         for told in sequences:
-            nearest = torch.cdist(told.conditions / width, known).argmin(dim=1).tolist()
+            nearest = torch.cdist(torch.from_numpy(told.conditions) / width, known).argmin(dim=1).tolist()
             found.append(np.stack([frames[place][0].maps[frames[place][1]] for place in nearest]))
         return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from muslin.learn.drape.fabric import FIGURES, fabric_figures
 from muslin.learn.drape.world import shape_tensor
 from muslin.sim.body.joints import JOINT
 from muslin.sim.body.rotation import rotation_matrices
-from muslin.sim.dataset.sample import BodyTrack
+from muslin.sim.dataset.sample import BodyTrack, Sample
 
 JOINTS = tuple(
     JOINT[name]
@@ -112,3 +112,15 @@ def motion_features(
     velocity = np.einsum("tji,tj->ti", turned[1:, 0], np.diff(translations, axis=0)) * fps
     moving = np.concatenate([velocity, rates], axis=1)
     return np.concatenate([moving[:1], moving])
+
+
+def varied_parameters(samples: Iterable[Sample]) -> tuple[str, ...]:
+    """Names of the design parameters that are not the same in all samples."""
+    found = [sample.frame_garment(0).parameters for sample in samples]
+    return tuple(name for name, value in found[0].items() if any(own[name] != value for own in found))
+
+
+def used_betas(samples: Iterable[Sample]) -> int:
+    """Number of shape coefficients up to the last that some sample uses, at least one."""
+    used = [np.flatnonzero(sample.body.beta) for sample in samples if sample.body is not None]
+    return max((int(own.max()) + 1 for own in used if len(own)), default=1)

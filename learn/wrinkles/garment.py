@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from hashlib import sha256
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from muslin.learn.wrinkles.codec import MapCodec
 from muslin.learn.wrinkles.fields import motion_fields
 from muslin.learn.wrinkles.layout import map_layout
 from muslin.learn.wrinkles.skin import GarmentSkin, garment_skin
+from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.body.model import BodyModel
 from muslin.sim.dataset.sample import BodyTrack
 
@@ -63,3 +65,18 @@ def unposed_garment(
     place = correspondence(own, mesh)
     skin = garment_skin(own, positions, body).carried(place)
     return UnposedGarment(mesh, place.carry(positions), skin, codec, coarse)
+
+
+class GarmentCache:
+    """Unposed garments, each made once a design and triangulation."""
+
+    def __init__(self, network: MeanDrape, world: SequenceWorld, size: int, places: int) -> None:
+        self.network, self.world, self.body = network, world, world.load_body()
+        self.size, self.places = size, places
+        self._known: dict[str, UnposedGarment] = {}
+
+    def of(self, mesh: GarmentMesh) -> UnposedGarment:
+        key = sha256(mesh.panel_vertices.tobytes() + mesh.panel_faces.tobytes()).hexdigest()
+        if key not in self._known:
+            self._known[key] = unposed_garment(mesh, self.network, self.body, self.size, self.places)
+        return self._known[key]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from muslin.garments.errors import InputError
 from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.training.checkpoint import read_tensors, write_tensors
+from muslin.learn.wrinkles.clips import Told
 from muslin.learn.wrinkles.condition import Condition
-from muslin.learn.wrinkles.frames import GarmentCache, Told
+from muslin.learn.wrinkles.garment import GarmentCache
 from muslin.learn.wrinkles.network import NetworkConfig, WrinkleNetwork
 from muslin.learn.wrinkles.process import Drawing, Process
 from muslin.learn.wrinkles.rollout import Noise, roll_out

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from muslin.learn.training.batches import ShuffledBatches, evenly
+from muslin.learn.wrinkles.clips import Clip, digest_of
 from muslin.learn.wrinkles.degrade import Degrading
-from muslin.learn.wrinkles.frames import Clip, digest_of
 from muslin.learn.wrinkles.layout import MapLayout
 from muslin.learn.wrinkles.network import Seen, WrinkleNetwork
 from muslin.learn.wrinkles.process import Drawing, Process
@@ -55,7 +55,8 @@ class Frames:
             conditions.append(clip.told.conditions[k])
             fields.append(clip.told.fields[k])
             known.append(float(k > 0))
-        seen = Seen(torch.stack(conditions), torch.stack(fields), self._images(before), torch.tensor(known))
+        told = torch.from_numpy(np.stack(conditions)), torch.from_numpy(np.stack(fields))
+        seen = Seen(*told, self._images(before), torch.tensor(known))
         return self._images(maps), seen
 
     def _images(self, maps: Sequence[NDArray[np.float32]]) -> Tensor:

@@ -16,9 +16,9 @@ from muslin.garments.errors import InputError
 from muslin.garments.mesh import GarmentMesh
 from muslin.learn.drape.body_surface import nearest_on
 from muslin.learn.drape.push_out import PushOut
+from muslin.learn.wrinkles.clips import Told, told_of
 from muslin.learn.wrinkles.condition import Condition
-from muslin.learn.wrinkles.frames import GarmentCache, Told, told_of
-from muslin.learn.wrinkles.garment import UnposedGarment
+from muslin.learn.wrinkles.garment import GarmentCache, UnposedGarment
 from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.body_motion import body_track
 from muslin.sim.dataset.certificate import Certificate

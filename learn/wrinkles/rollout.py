@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from muslin.learn.wrinkles.frames import Told
+from muslin.learn.wrinkles.clips import Told
 from muslin.learn.wrinkles.network import Seen, WrinkleNetwork
 from muslin.learn.wrinkles.process import Drawing, Process
 
@@ -86,8 +86,8 @@ def _next(
     noise: Noise,
 ) -> Tensor:
     """Maps (B, 3, S, S) of frames (sequence, frame)."""
-    conditions = torch.stack([sequences[k].conditions[t] for k, t in frames])
-    fields = torch.stack([sequences[k].fields[t] for k, t in frames])
+    conditions = torch.from_numpy(np.stack([sequences[k].conditions[t] for k, t in frames]))
+    fields = torch.from_numpy(np.stack([sequences[k].fields[t] for k, t in frames]))
     if before:
         previous, known = torch.stack([before[k] for k, _ in frames]), torch.ones(len(frames))
     else:

@@ -14,13 +14,24 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.garments.template import EDGE_LENGTHS, template, template_of
 from muslin.learn.drape.fit_mean import fit_mean
 from muslin.learn.drape.mean import MeanDrape
+from muslin.learn.wrinkles.condition import varied_parameters
 from muslin.learn.wrinkles.skin import GarmentSkin, garment_skin
+from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.body.model import BodyModel
 from muslin.sim.body.skinning import bind
 from muslin.sim.dataset.sample import Sample
 
 ROUNDS = 4
 """Of template and skin, each from the other; in the last the template moves by less than a millimetre."""
+
+
+def templates_of(samples: Sequence[Sample], world: SequenceWorld, seed: int = 0) -> MeanDrape:
+    """G_design of sequences."""
+    designs: dict[tuple[float, ...], list[Sample]] = {}
+    for sample in samples:
+        world.check(sample)
+        designs.setdefault(tuple(sample.garment.parameters.values()), []).append(sample)
+    return fit_templates([*designs.values()], varied_parameters(samples), world.load_body(), seed)
 
 
 def fit_templates(

@@ -11,26 +11,22 @@ import torch
 
 from muslin.garments.errors import InputError
 from muslin.learn.training.loop import Report, Settings, train
-from muslin.learn.wrinkles.condition import Condition
+from muslin.learn.wrinkles.clips import Clip, read_clips
+from muslin.learn.wrinkles.condition import Condition, used_betas, varied_parameters
 from muslin.learn.wrinkles.degrade import Degrading
 from muslin.learn.wrinkles.fields import FIELDS
-from muslin.learn.wrinkles.frames import (
-    Clip,
-    read_clips,
-    templates_of,
-    used_betas,
-    varied_parameters,
-    world_of,
-)
 from muslin.learn.wrinkles.layout import map_layout
 from muslin.learn.wrinkles.model import WrinkleModel
 from muslin.learn.wrinkles.network import SIZES, NetworkConfig, WrinkleNetwork
 from muslin.learn.wrinkles.objective import WrinkleObjective
+from muslin.learn.wrinkles.pictures import Example, Pictures
 from muslin.learn.wrinkles.process import Process
+from muslin.learn.wrinkles.templates import templates_of
+from muslin.learn.wrinkles.world import world_of
 from muslin.sim.dataset.reader import Dataset
 
 Stage = Callable[[str], Report]
-MAPS, TRAIN = "maps", "train"
+MAPS, TRAIN, PICTURES = "maps", "train", "pictures"
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,7 @@ def train_wrinkles(
     clips = {
         name: read_clips(part, model.garments, condition, out / MAPS, told) for name, part in sets.items()
     }
-    conditions = torch.cat([clip.told.conditions for clip in clips[TRAIN]])
+    conditions = torch.from_numpy(np.concatenate([clip.told.conditions for clip in clips[TRAIN]]))
     network.normalise(conditions, spread_of(clips[TRAIN]))
     objective = WrinkleObjective(
         clips,
@@ -103,7 +99,15 @@ def train_wrinkles(
         settings.batch,
         seed,
     )
-    train(network, objective, settings.training, out / TRAIN, report=stage("wrinkles") if stage else None)
+    examples = {
+        name: Example(part[0], model.garments.of(part[0].garment), clips[name][0], len(clips[name][0]) // 2)
+        for name, part in sets.items()
+    }
+    pictures = Pictures(
+        examples, process, float(network.spread), settings.training.epochs, out / TRAIN / PICTURES
+    )
+    told = stage("wrinkles") if stage else None
+    train(network, objective, settings.training, out / TRAIN, report=told, after=pictures)
     network.to("cpu").eval()
     model.save(out)
     return model

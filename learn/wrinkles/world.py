@@ -9,6 +9,7 @@ from typing import Any
 from muslin.garments.errors import InputError
 from muslin.learn.drape.world import same_body
 from muslin.sim.body.model import BodyModel
+from muslin.sim.dataset.reader import Dataset
 from muslin.sim.dataset.sample import BodyTrack, Sample
 
 
@@ -51,3 +52,21 @@ class SequenceWorld:
             raise InputError(f"fabric {sample.fabric!r}: {', '.join(self.fabrics)} were learned")
         assert body is not None
         return body
+
+
+def world_of(dataset: Dataset) -> SequenceWorld:
+    """That of the first sequence of a dataset, with the fabrics of all.
+
+    Raises InputError if there is none, or it is on no parametric body.
+    """
+    if not len(dataset):
+        raise InputError(f"{dataset.root}: no sequence is left to learn from")
+    sample = dataset[0]
+    if sample.body is None or sample.fps is None:
+        raise InputError(
+            f"sample {sample.id} is no sequence on a parametric body; select sequences on one (`muslin info`)"
+        )
+    fabrics = tuple(dict.fromkeys(row["fabric"] for row in dataset.rows))
+    return SequenceWorld(
+        sample.frame_garment(0).name, sample.body.model, sample.body.digest, fabrics, sample.fps
+    )
