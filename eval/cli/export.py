@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from muslin.eval.cli.options import Where, conditions_of
 from muslin.garments.errors import InputError
 
 
@@ -28,12 +29,7 @@ def export(
         ),
     ] = None,
     split: Annotated[str | None, typer.Option("--split", metavar="NAME", help="Only this split.")] = None,
-    where: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--where", metavar="KEY=VALUE", help="Only samples like this, e.g. design=tshirt. Repeatable."
-        ),
-    ] = None,
+    where: Where = None,
     samples: Annotated[
         list[str] | None, typer.Option("--sample", metavar="ID", help="Only these samples. Repeatable.")
     ] = None,
@@ -63,7 +59,7 @@ def export(
         raise InputError(
             "--layout is for whole datasets, and says the formats of files; give it without --format"
         )
-    conditions = _conditions(where or [])
+    conditions = conditions_of(where)
     if layout is not None:
         with progress_bar("export") as update:
             done = export_layout(
@@ -88,11 +84,3 @@ def export(
         with progress_bar("export") as update:
             files = export_dataset(chosen, out, file_format, body=body, progress=update)
     typer.echo(f"{out}: {len(files)} files")
-
-
-def _conditions(where: list[str]) -> dict[str, str]:
-    pairs = [entry.partition("=") for entry in where]
-    for key, equals, value in pairs:
-        if not (key and equals):
-            raise InputError(f"--where {key}{equals}{value}: must be KEY=VALUE, e.g. design=tshirt")
-    return {key: value for key, _, value in pairs}

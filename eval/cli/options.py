@@ -40,6 +40,14 @@ DatasetPlace = Annotated[
 SampleId = Annotated[
     str | None, typer.Option("--sample", metavar="ID", help="The sample; see `muslin info DIR --samples`.")
 ]
+Where = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--where",
+        metavar="KEY=VALUE",
+        help="Only samples like this, e.g. design=tshirt, or sequence=walk*. Repeatable.",
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace the output if it is there.")]
 
 
@@ -91,3 +99,12 @@ def check_empty_folder(path: Path) -> Path:
     if path.is_file() or (path.is_dir() and any(path.iterdir())):
         raise InputError(f"{path} is not an empty folder; give a new one: nothing there is touched")
     return path
+
+
+def conditions_of(where: list[str] | None) -> dict[str, str]:
+    """{key: value} of `Where`. Raises InputError for what is no KEY=VALUE."""
+    pairs = [entry.partition("=") for entry in where or []]
+    for key, equals, value in pairs:
+        if not (key and equals):
+            raise InputError(f"--where {key}{equals}{value}: must be KEY=VALUE, e.g. design=tshirt")
+    return {key: value for key, _, value in pairs}

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from muslin.eval.cli.options import Force, Overrides, check_empty_folder, check_new
+from muslin.eval.cli.options import (
+    Force,
+    Overrides,
+    Where,
+    check_empty_folder,
+    check_new,
+    conditions_of,
+)
 from muslin.garments.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,6 +53,7 @@ def predict(
         str | None, typer.Option("--dataset", metavar="DIR", help="Predict all samples of a dataset instead.")
     ] = None,
     split: Annotated[str | None, typer.Option("--split", metavar="NAME", help="Of the dataset.")] = None,
+    where: Where = None,
     scene: Annotated[
         Path | None,
         typer.Option("--scene", metavar="SCENE.toml", help="Predict the sequence of a scene instead."),
@@ -105,7 +113,7 @@ def predict(
     from muslin.sim.dataset.selection import select
 
     use_all_cores()
-    truth = None if dataset is None else select(dataset, split)
+    truth = None if dataset is None else select(dataset, split, conditions_of(where))
     if scene is not None or (truth is not None and _moves(truth, model)):
         drawing = _drawing(drawn, strength)
         animator = _animator(model, drawing, fresh_noise, baseline, dataset)

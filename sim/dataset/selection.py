@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ def select(
 
     split   those of this split
     where   those with these values in their row of the index, e.g. {"design": "tshirt", "topologies": 1};
-            a number may be given as text
+            a number may be given as text, and of a text a pattern such as "walk*"
     ids     these, in this order
 
     Raises InputError for a split, column or id that is not there, and if no sample is left.
@@ -57,4 +58,6 @@ def _equal(stored: Any, asked: Any) -> bool:
             return stored == float(asked)
         except ValueError:
             return False
+    if isinstance(stored, str) and isinstance(asked, str):
+        return fnmatchcase(stored, asked)
     return bool(stored == asked)

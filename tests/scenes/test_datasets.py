@@ -73,21 +73,7 @@ def test_the_animated_dataset_of_the_thesis() -> None:
     small = planned(ANIMATED, "small")
     assert members(small, "design") == names
     assert members(small, "sequence", "test-sequences") == {"held-kick"}
+    assert members(small, "sequence", "test-designs") >= {"held-kick", "held-walk-right-sharp"}
     at_rest = planned(ANIMATED, "small-at-rest")
     assert {job.scene["motion"]["mode"] for job in at_rest.jobs} == {"quasi-static"}
     assert members(at_rest, "sequence") == members(small, "sequence")
-
-
-@pytest.mark.parametrize(("file", "samples"), [(ANIMATED, 3)])
-def test_the_tiny_presets_are_made_and_verified(file: Path, samples: int, tmp_path: Path) -> None:
-    report = generate(load_config(file, preset="tiny"), tmp_path / "tiny", workers=2)
-    assert not report.failed
-    dataset = open_dataset(tmp_path / "tiny")
-    assert len(dataset.rows) == samples
-    for row in dataset.rows:
-        assert verify_sample(dataset[row["id"]]).reason == ""
-    meshes = {
-        (row["design"], row["topology"]): dataset[row["id"]].garment.faces.tobytes() for row in dataset.rows
-    }
-    for row in dataset.rows:
-        assert dataset[row["id"]].garment.faces.tobytes() == meshes[row["design"], row["topology"]]

@@ -28,6 +28,7 @@ def test_all_conditions_hold(dataset: Dataset) -> None:
     assert select(str(dataset.root), "train").ids == ("x", "z")
     assert select(dataset, where={"frames": 3}).ids == ("y", "z")
     assert select(dataset, where={"frames": "3", "design": "a"}).ids == ("y",)
+    assert select(dataset, where={"design": "a*"}).ids == select(dataset, where={"design": "a"}).ids
     assert select(dataset, ids=["z", "x", "z"]).ids == ("z", "x")
     assert select(dataset, "test", {"design": "a"}, ["z", "y"]).ids == ("y",)
 
