@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.nn.functional import conv2d
+from torch.nn.functional import conv2d, interpolate
 
 from muslin.garments.errors import InputError
 
@@ -14,15 +14,23 @@ REACH = 3.0
 """Standard deviations after which the kernel of a blur ends."""
 
 
+PATCH = 16
+"""Texels a side of what noise is the same over, about: a network's errors are smooth."""
+
+
 @dataclass(frozen=True)
 class Degrading:
-    """blur: standard deviation at most, in shares of the map's side; colour: of scale and, in spreads, offset
-    of each channel, standard deviation; noise: the same of what is added to each texel before the blur;
-    unknown: share of maps that are left out, as before a first frame."""
+    """blur: standard deviation at most, in shares of the map's side; colour: standard deviation of the scale
+    and, in spreads, of the offset of each channel; noise: the same of what is added, smooth over PATCH
+    texels; unknown: share of maps that are left out, as before a first frame.
+
+    The thesis blurs and jitters colours. Noise of the size of a network's own errors keeps it from taking the
+    frame before as the truth, so that errors die out instead of adding up.
+    """
 
     blur: float = 0.02
-    colour: float = 0.1
-    noise: float = 0.2
+    colour: float = 0.15
+    noise: float = 0.3
     unknown: float = 0.1
 
     def __post_init__(self) -> None:
@@ -31,11 +39,11 @@ class Degrading:
                 raise InputError(f"{name} = {getattr(self, name)}: must be from 0 to {most:g}")
 
     def __call__(self, maps: Tensor, mask: Tensor, generator: torch.Generator) -> Tensor:
-        """Maps (B, 3, S, S) noisy, blurred, channels scaled and shifted; 0 outside of the mask (S, S)."""
-        count = len(maps)
-        worse = maps + self.noise * torch.randn(maps.shape, generator=generator)
-        width = self.blur * maps.shape[-1] * float(torch.rand((), generator=generator))
-        worse = blurred(worse, mask, width)
+        """Maps (B, 3, S, S) blurred, noisy, channels scaled and shifted; 0 outside of the mask (S, S)."""
+        count, size = len(maps), maps.shape[-1]
+        worse = blurred(maps, mask, self.blur * size * float(torch.rand((), generator=generator)))
+        coarse = torch.randn((count, 3, size // PATCH + 1, size // PATCH + 1), generator=generator)
+        worse = worse + self.noise * interpolate(coarse, size=(size, size), mode="bicubic")
         scale, offset = self.colour * torch.randn((2, count, 3, 1, 1), generator=generator)
         return ((1.0 + scale) * worse + offset) * mask
 

@@ -25,7 +25,7 @@ MOST_VALIDATED = 32
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Noisy maps x (B, 3, S, S) at t (B,), what is seen beside them, and what is to be said of them."""
+    """Noisy maps x (B, 3, S, S) at t (B,), what is seen beside them, and the maps without noise."""
 
     x: Tensor
     t: Tensor
@@ -64,7 +64,8 @@ class Frames:
 
 
 class WrinkleObjective:
-    """Mean square, over texels of the mask, of what the network says wrong of noisy maps (see `Process`)."""
+    """Mean square, over texels of the mask, of what the network says wrong of maps, weighted as `Process`
+    does."""
 
     def __init__(
         self,
@@ -99,15 +100,14 @@ class WrinkleObjective:
         """A batch of maps (B, 3, S, S) with random noise at random levels."""
         t = self.process.times(len(maps), generator)
         noise = torch.randn(maps.shape, generator=generator) * self.mask
-        x, target = self.process.pair(maps, noise, t)
-        return Batch(x, t, seen, target)
+        return Batch(self.process.noisy(maps, noise, t), t, seen, maps)
 
     def loss(self, model: nn.Module, batch: Batch) -> Tensor:
         device = next(model.parameters()).device
         said = model(batch.x.to(device), batch.t.to(device), batch.seen.to(device))
         # Both are 0 outside of the mask.
-        wrong = (said - batch.target.to(device)).square().sum()
-        return wrong / (len(said) * said.shape[1] * self.mask.sum())
+        wrong = (said - batch.target.to(device)).square().sum((1, 2, 3)) / (said.shape[1] * self.mask.sum())
+        return (self.process.weight(batch.t).to(device) * wrong).mean()
 
     def validate(self, model: nn.Module) -> dict[str, float]:
         """Of some frames of each set the mean length of what is wrong in a texel, mm, drawn from one noise in

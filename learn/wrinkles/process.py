@@ -35,8 +35,11 @@ FLOW_NOISES = 1000
 FURTHEST = 8.0
 """Spreads beyond which no value of a map lies; cuts off what division by nearly nothing makes of noise."""
 
+HEAVIEST = 25.0
+"""Of the weights of a loss, which are without bound where there is hardly any noise."""
+
 Predict = Callable[[Tensor, Tensor], Tensor]
-"""The network's answer to (x, t), all else fixed."""
+"""The network's answer to (x_t, t), all else fixed: x."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +68,19 @@ class Drawing:
 
 
 class Process:
-    """Noisy maps x_t of maps x and noise e of unit variance, and what a network is to say of them.
+    """Noisy maps x_t of maps x and noise e of unit variance, and how wrong a network is about x.
 
-    | kind | x_t | said |
+    | kind | x_t | loss |
     | --- | --- | --- |
-    | epsilon | sqrt(a_t) x + sqrt(1 - a_t) e, a_t by the cosine schedule, 100 levels | e |
-    | v | the same | sqrt(a_t) e - sqrt(1 - a_t) x |
-    | flow | (1 - s) x + s e, t = 1000 s | e - x |
-    | regression | 0, t = 0 | x |
+    | epsilon | sqrt(a) x + sqrt(1 - a) e, a = a_t of the cosine schedule, 100 levels | a / (1 - a) d^2 |
+    | v | the same | 1 / (1 - a) d^2 |
+    | flow | (1 - s) x + s e, t = 1000 s | 1 / s^2 d^2 |
+    | regression | 0, t = 0 | d^2 |
+
+    d = F(x_t, t) - x: networks say x itself. The losses are those of e, of v = sqrt(a) e - sqrt(1 - a) x, and
+    of the velocity e - x, which follow from x and x_t; weights are cut at HEAVIEST. Noise has as many
+    dimensions as a map has texels; a network of few channels could not even pass it on, but the maps are
+    smooth (Li and He 2025, "Back to Basics: Let Denoising Generative Models Denoise").
 
     Sources: Ho et al. 2020, "Denoising Diffusion Probabilistic Models"; Nichol and Dhariwal 2021, "Improved
     Denoising Diffusion Probabilistic Models" (cosine schedule); Salimans and Ho 2022, "Progressive
@@ -86,7 +94,7 @@ class Process:
         self._options: dict[str, Any] = {
             "num_train_timesteps": NOISES,
             "beta_schedule": "squaredcos_cap_v2",
-            "prediction_type": "v_prediction" if kind == "v" else "epsilon",
+            "prediction_type": "sample",
         }
         self._noises = DDPMScheduler(**self._options)
 
@@ -99,15 +107,25 @@ class Process:
             return torch.zeros(count)
         return torch.randint(NOISES, (count,), generator=generator)
 
-    def pair(self, x: Tensor, noise: Tensor, t: Tensor) -> tuple[Tensor, Tensor]:
-        """(x_t, what is to be said), each (B, 3, S, S), of x and noise (B, 3, S, S), t (B,)."""
+    def noisy(self, x: Tensor, noise: Tensor, t: Tensor) -> Tensor:
+        """x_t (B, 3, S, S) of x and noise (B, 3, S, S), t (B,)."""
         if self.kind == "regression":
-            return torch.zeros_like(x), x
+            return torch.zeros_like(x)
         if self.kind == "flow":
             s = (t / FLOW_NOISES)[:, None, None, None]
-            return (1.0 - s) * x + s * noise, noise - x
-        noisy = self._noises.add_noise(x, noise, t)
-        return noisy, self._noises.get_velocity(x, noise, t) if self.kind == "v" else noise
+            return (1.0 - s) * x + s * noise
+        found: Tensor = self._noises.add_noise(x, noise, t)
+        return found
+
+    def weight(self, t: Tensor) -> Tensor:
+        """(B,) of the square of what is wrong at t (B,)."""
+        if self.kind == "regression":
+            return torch.ones(len(t))
+        if self.kind == "flow":
+            return (t / FLOW_NOISES).square().reciprocal().clamp_max(HEAVIEST)
+        kept = self._noises.alphas_cumprod[t]
+        over = kept if self.kind == "epsilon" else torch.ones_like(kept)
+        return (over / (1.0 - kept)).clamp_max(HEAVIEST)
 
     def draw(
         self,
@@ -131,6 +149,8 @@ class Process:
             x = self._begun(before, noise, times[0])
         for t in times:
             said = predict(x, t.to(torch.float32).expand(len(x)))
+            if asked.sampler == "euler":
+                said = (x - said) * (FLOW_NOISES / t)
             more = {"generator": generators} if asked.sampler == "ddpm" else {}
             x = scheduler.step(said, t, x, **more).prev_sample
         return x
