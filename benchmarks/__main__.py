@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from benchmarks import at_scale
+from benchmarks import at_scale, learned
 from benchmarks.options import OUT, Core, Out, Rounds, Setting
 from benchmarks.record import machine, write
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(at_scale.app)
+app.add_typer(learned.app)
 
 
 @app.command("setting")
@@ -323,25 +324,6 @@ def steps(
             f"mean {row.mean:.2f}, p99 {row.p99:.2f} mm, {row.cpu_ms:.0f} CPU ms"
         )
     write(out / "steps.json", [asdict(row) for row in found])
-
-
-@app.command()
-def inference(
-    model: Annotated[Path | None, typer.Option(help="What `muslin train drape` wrote.")] = None,
-    threads: Annotated[int, typer.Option(min=1, help="Of the networks.")] = 2,
-    batch: Annotated[int, typer.Option(min=1, help="Drapes in a batch.")] = 8,
-    rounds: Rounds = 3,
-    out: Out = OUT,
-) -> None:
-    """Learned drapes a second, and how much faster than a simulated one."""
-    from benchmarks.inference import measure_inference
-    from benchmarks.spread import spread
-
-    found = measure_inference(model, threads, batch, rounds)
-    for name, seconds in ((1, found.one), (batch, found.batched)):
-        typer.echo(f"{name} at a time: {spread([1.0 / value for value in seconds]).text(1)} drapes a second")
-    typer.echo(f"simulated: {spread(found.simulated).text(1)} s, {found.times_faster.text(0)} times as long")
-    write(out / "inference.json", asdict(found))
 
 
 if __name__ == "__main__":

@@ -150,8 +150,8 @@ def _animator(
     from muslin.sim.dataset.reader import open_dataset
 
     loaded = load_wrinkles(model or SHIPPED)
-    drawing.of(loaded.process.kind)
-    loaded.drawing, loaded.noise = drawing, "fresh" if fresh_noise else "fixed"
+    loaded.drawing = drawing.of(loaded.process.kind)
+    loaded.noise = "fresh" if fresh_noise else "fixed"
     return loaded if baseline is None else baseline_of(loaded, baseline, open_dataset(str(dataset)))
 
 

@@ -35,8 +35,9 @@ FLOW_NOISES = 1000
 FURTHEST = 8.0
 """Spreads beyond which no value of a map lies; cuts off what division by nearly nothing makes of noise."""
 
-HEAVIEST = 25.0
-"""Of the weights of a loss, which are without bound where there is hardly any noise."""
+HEAVIEST = 5.0
+"""Of the weights of a loss, which are without bound where there is hardly any noise: there x is nearly told
+already, and what conditions say of it is learned where there is much."""
 
 Predict = Callable[[Tensor, Tensor], Tensor]
 """The network's answer to (x_t, t), all else fixed: x."""
@@ -99,10 +100,9 @@ class Process:
         self._noises = DDPMScheduler(**self._options)
 
     def times(self, count: int, generator: torch.Generator) -> Tensor:
-        """(count,) t to learn at, random: of diffusion uniform; of a flow s = sigmoid(n), n standard normal
-        (Esser et al. 2024, "Scaling Rectified Flow Transformers"), which sees the middle more."""
+        """(count,) t to learn at, random and uniform."""
         if self.kind == "flow":
-            return FLOW_NOISES * torch.randn(count, generator=generator).sigmoid()
+            return FLOW_NOISES * torch.rand(count, generator=generator).clamp_min(1.0 / FLOW_NOISES)
         if self.kind == "regression":
             return torch.zeros(count)
         return torch.randint(NOISES, (count,), generator=generator)

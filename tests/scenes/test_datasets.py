@@ -8,11 +8,8 @@ from pathlib import Path
 import pytest
 
 from muslin.sim.dataset.config import load_config
-from muslin.sim.dataset.generate import generate
 from muslin.sim.dataset.plan import Plan, plan
-from muslin.sim.dataset.reader import open_dataset
 from muslin.sim.dataset.sources import check_sources
-from muslin.sim.dataset.verify import verify_sample
 from muslin.sim.scene import parse_scene
 
 FOLDER = Path(__file__).parents[2] / "scenes/datasets"
