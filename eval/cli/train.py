@@ -151,6 +151,9 @@ def wrinkles(
         bool, typer.Option("--fields/--no-fields", help="Told at every place what acts on the cloth there.")
     ] = True,
     fabric_input: Annotated[bool, typer.Option("--fabric-input", help="Told the fabric.")] = False,
+    mirror: Annotated[
+        bool, typer.Option("--mirror/--no-mirror", help="Learn from mirror images as well.")
+    ] = True,
     batch: Annotated[int, typer.Option("--batch", min=1, help="Frames in a batch.")] = 8,
     learning_rate: Rate = 1e-3,
     precision: Precision = "no",
@@ -175,7 +178,7 @@ def wrinkles(
         raise InputError(f"--kind {kind}: must be temporal or static")
     settings = WrinkleSettings(
         _settings(epochs, learning_rate, precision, seed),
-        kind == "temporal", process, network, size, pose, motion, fabric_input, fields, batch,
+        kind == "temporal", process, network, size, pose, motion, fabric_input, fields, mirror, batch,
     )  # fmt: skip
     with _stages() as stage:
         model = train_wrinkles(open_dataset(dataset), out, settings, stage)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from muslin.learn.wrinkles.condition import Condition
 from muslin.learn.wrinkles.garment import GarmentCache, UnposedGarment
+from muslin.learn.wrinkles.mirror import mirrored_track
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.reader import Dataset
 from muslin.sim.dataset.sample import BodyTrack, Sample
@@ -59,17 +60,21 @@ def read_clips(
     condition: Condition,
     folder: Path | None = None,
     progress: Callable[[float, int, str], None] | None = None,
+    *,
+    mirror: bool = False,
 ) -> list[Clip]:
     """Every sequence of a dataset; its maps and fields, with a folder, kept there for another time.
 
-    Raises InputError for a sample of another world.
+    mirror: after each its mirror image. Raises InputError for a sample of another world.
     """
     world = garments.world
     clips = []
     for done, sample in enumerate(dataset):
         track = world.check(sample)
         garment = garments.of(sample.frame_garment(0))
-        clips.append(_clip(garment, sample, track, condition, world.fps, folder))
+        clips.append(_clip(garment, sample, track, False, condition, world.fps, folder))
+        if mirror:
+            clips.append(_clip(garment, sample, track, True, condition, world.fps, folder))
         if progress is not None:
             progress(done + 1, len(dataset), f"maps of {sample.id}")
     return clips
@@ -91,27 +96,31 @@ def _clip(
     garment: UnposedGarment,
     sample: Sample,
     track: BodyTrack,
+    mirror: bool,
     condition: Condition,
     fps: float,
     folder: Path | None,
 ) -> Clip:
+    moved = mirrored_track(track, garment.skin.model) if mirror else track
+
     def maps() -> NDArray[np.float32]:
-        return garment.maps(sample.positions, track)
+        made = garment.mirrored_maps if mirror else garment.maps
+        return made(sample.positions, track)
 
     def fields() -> NDArray[np.float32]:
-        return told_of(garment, track, sample.fabric, condition, fps).fields
+        return told_of(garment, moved, sample.fabric, condition, fps).fields
 
+    name = f"{sample.id}-mirrored" if mirror else sample.id
     if folder is None:
-        return Clip(sample.id, maps(), told_of(garment, track, sample.fabric, condition, fps))
+        return Clip(name, maps(), told_of(garment, moved, sample.fabric, condition, fps))
     size, places = garment.codec.layout.size, garment.places.layout.size
-    of = [garment.template, sample.positions, track.beta, track.poses, track.translations]
-    key = sha256(repr((KEPT, size, places, condition.fields, fps)).encode())
-    for values in of:
+    key = sha256(repr((KEPT, size, places, condition.fields, fps, mirror)).encode())
+    for values in (garment.template, sample.positions, track.beta, track.poses, track.translations):
         key.update(np.ascontiguousarray(values).data)
-    name = key.hexdigest()[:24]
-    kept = _kept(folder / f"{name}-fields.npy", fields)
-    conditions = condition.of(track, fps, garment.mesh.parameters, sample.fabric).numpy()
-    return Clip(sample.id, _kept(folder / f"{name}-maps.npy", maps), Told(conditions, kept))
+    stem = key.hexdigest()[:24]
+    kept = _kept(folder / f"{stem}-fields.npy", fields)
+    conditions = condition.of(moved, fps, garment.mesh.parameters, sample.fabric).numpy()
+    return Clip(name, _kept(folder / f"{stem}-maps.npy", maps), Told(conditions, kept))
 
 
 def _kept(file: Path, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:

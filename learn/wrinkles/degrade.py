@@ -1,4 +1,4 @@
-"""Previous maps made worse in training, as they will be when they are the network's own."""
+"""What networks see made worse in training, as it will be when it is their own, or new."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ PATCH = 16
 class Degrading:
     """blur: standard deviation at most, in shares of the map's side; colour: standard deviation of the scale
     and, in spreads, of the offset of each channel; noise: the same of what is added, smooth over PATCH
-    texels; unknown: share of maps that are left out, as before a first frame.
+    texels; unknown: share of maps that are left out, as before a first frame; conditions: standard deviation
+    of what is added to these, in their spreads.
 
     The thesis blurs and jitters colours. Noise of the size of a network's own errors keeps it from taking the
     frame before as the truth, so that errors die out instead of adding up.
@@ -32,9 +33,16 @@ class Degrading:
     colour: float = 0.15
     noise: float = 0.3
     unknown: float = 0.1
+    conditions: float = 0.1
 
     def __post_init__(self) -> None:
-        for name, most in (("blur", 0.25), ("colour", 1.0), ("noise", 1.0), ("unknown", 1.0)):
+        for name, most in (
+            ("blur", 0.25),
+            ("colour", 1.0),
+            ("noise", 1.0),
+            ("unknown", 1.0),
+            ("conditions", 1.0),
+        ):
             if not 0.0 <= getattr(self, name) <= most:
                 raise InputError(f"{name} = {getattr(self, name)}: must be from 0 to {most:g}")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 
 import numpy as np
@@ -15,6 +15,7 @@ from muslin.learn.drape.mean import MeanDrape
 from muslin.learn.wrinkles.codec import MapCodec
 from muslin.learn.wrinkles.fields import motion_fields
 from muslin.learn.wrinkles.layout import map_layout
+from muslin.learn.wrinkles.mirror import FLIP, mirrored_uv
 from muslin.learn.wrinkles.skin import GarmentSkin, garment_skin
 from muslin.learn.wrinkles.world import SequenceWorld
 from muslin.sim.body.model import BodyModel
@@ -39,6 +40,15 @@ class UnposedGarment:
         """
         apart = self.skin.unposed(positions, track.beta, track.poses, track.translations) - self.template
         return self.codec.encode(apart).astype(np.float32)
+
+    def mirrored_maps(self, positions: NDArray[np.floating], track: BodyTrack) -> NDArray[np.float32]:
+        """m (T, N, 3) of the mirror image of positions x, on that of the moving body (see `mirrored_track`).
+
+        Body and template are as good as symmetric, or else it is of a body slightly another.
+        """
+        unposed = self.skin.unposed(positions, track.beta, track.poses, track.translations)
+        reflected = MapCodec(self.codec.layout, replace(self.mesh, uv=mirrored_uv(self.mesh)))
+        return (reflected.encode(FLIP * unposed) - self.codec.encode(self.template)).astype(np.float32)
 
     def fields(self, track: BodyTrack, fps: float) -> NDArray[np.float32]:
         """(T, FIELDS, S, S) `motion_fields` on a moving body, as images of the size of `places`."""

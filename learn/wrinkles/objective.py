@@ -81,6 +81,8 @@ class WrinkleObjective:
         self.sets = {name: Frames(clips, layout, spread) for name, clips in sets.items()}
         self.process, self.degrading, self.seed = process, degrading, seed
         self.mask = torch.from_numpy(layout.mask).float()
+        own = np.concatenate([clip.told.conditions for clip in sets["train"]])
+        self.width = torch.from_numpy(own.std(axis=0))
         self._order = ShuffledBatches(len(self.sets["train"]), batch, seed)
 
     def steps(self) -> int:
@@ -93,7 +95,9 @@ class WrinkleObjective:
             maps, seen = self.sets["train"].read(places)
             previous = self.degrading(seen.previous, self.mask, generator)
             kept = torch.rand(len(places), generator=generator) >= self.degrading.unknown
-            seen = Seen(seen.conditions, seen.fields, previous, seen.known * kept)
+            off = torch.randn(seen.conditions.shape, generator=generator) * self.width
+            conditions = seen.conditions + self.degrading.conditions * off
+            seen = Seen(conditions, seen.fields, previous, seen.known * kept)
             yield self.noisy(maps, seen, generator)
 
     def noisy(self, maps: Tensor, seen: Seen, generator: torch.Generator) -> Batch:

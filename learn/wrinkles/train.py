@@ -32,7 +32,8 @@ MAPS, TRAIN, PICTURES = "maps", "train", "pictures"
 @dataclass(frozen=True)
 class WrinkleSettings:
     """temporal: whether the network sees the map of the frame before, made worse by `degrading`; process: see
-    `Process`; network: one of SIZES; size: of maps, texels; motion, fabric, fields: see `Condition`."""
+    `Process`; network: one of SIZES; size: of maps, texels; pose, motion, fabric, fields: see `Condition`;
+    mirror: whether mirror images are learned from too."""
 
     training: Settings
     temporal: bool = True
@@ -43,6 +44,7 @@ class WrinkleSettings:
     motion: bool = True
     fabric: bool = False
     fields: bool = True
+    mirror: bool = True
     batch: int = 8
     degrading: Degrading = field(default_factory=Degrading)
 
@@ -86,7 +88,10 @@ def train_wrinkles(
     model = WrinkleModel(world, templates, condition, process, network)
     told = stage("maps") if stage else None
     clips = {
-        name: read_clips(part, model.garments, condition, out / MAPS, told) for name, part in sets.items()
+        name: read_clips(
+            part, model.garments, condition, out / MAPS, told, mirror=settings.mirror and name == TRAIN
+        )
+        for name, part in sets.items()
     }
     conditions = torch.from_numpy(np.concatenate([clip.told.conditions for clip in clips[TRAIN]]))
     network.normalise(conditions, spread_of(clips[TRAIN]))
