@@ -20,19 +20,19 @@ PATCH = 16
 
 @dataclass(frozen=True)
 class Degrading:
-    """blur: standard deviation at most, in shares of the map's side; colour: standard deviation of the scale
-    and, in spreads, of the offset of each channel; noise: the same of what is added, smooth over PATCH
-    texels; unknown: share of maps that are left out, as before a first frame; conditions: standard deviation
-    of what is added to these, in their spreads.
+    """blur: standard deviation at most, in shares of the map's side; colour: standard deviation at most of
+    the scale and, in spreads, of the offset of each channel; noise: the same of what is added, smooth over
+    PATCH texels; unknown: share of maps that are left out, as before a first frame; conditions: standard
+    deviation of what is added to these, in their spreads.
 
-    The thesis blurs and jitters colours. Noise of the size of a network's own errors keeps it from taking the
-    frame before as the truth, so that errors die out instead of adding up.
+    The thesis blurs and jitters colours. Noise as large as a network's own errors, more on some maps than on
+    others, keeps it from taking the frame before as the truth, so that errors die out instead of adding up.
     """
 
     blur: float = 0.02
-    colour: float = 0.15
-    noise: float = 0.3
-    unknown: float = 0.1
+    colour: float = 0.5
+    noise: float = 0.8
+    unknown: float = 0.25
     conditions: float = 0.1
 
     def __post_init__(self) -> None:
@@ -51,8 +51,9 @@ class Degrading:
         count, size = len(maps), maps.shape[-1]
         worse = blurred(maps, mask, self.blur * size * float(torch.rand((), generator=generator)))
         coarse = torch.randn((count, 3, size // PATCH + 1, size // PATCH + 1), generator=generator)
-        worse = worse + self.noise * interpolate(coarse, size=(size, size), mode="bicubic")
-        scale, offset = self.colour * torch.randn((2, count, 3, 1, 1), generator=generator)
+        much = torch.rand((count, 1, 1, 1), generator=generator)
+        worse = worse + much * self.noise * interpolate(coarse, size=(size, size), mode="bicubic")
+        scale, offset = self.colour * much * torch.randn((2, count, 3, 1, 1), generator=generator)
         return ((1.0 + scale) * worse + offset) * mask
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import torch
 from diffusers import (
-    DDIMScheduler,
     DDPMScheduler,
     DPMSolverMultistepScheduler,
     FlowMatchEulerDiscreteScheduler,
@@ -167,19 +166,23 @@ class Process:
             flow = FlowMatchEulerDiscreteScheduler(num_train_timesteps=FLOW_NOISES)
             flow.set_timesteps(sigmas=strength * np.linspace(1.0, 1.0 / asked.steps, asked.steps))
             return flow, flow.timesteps
-        clip = {"clip_sample": True, "clip_sample_range": FURTHEST}
+        total = min(NOISES, round(asked.steps / strength))
+        first = total - max(1, round(strength * total))
         scheduler: Any
         if asked.sampler == "ddpm":
-            scheduler = DDPMScheduler(**self._options, **clip, timestep_spacing="trailing")
-        elif asked.sampler == "ddim":
-            scheduler = DDIMScheduler(**self._options, **clip, timestep_spacing="trailing")
-        else:
-            scheduler = DPMSolverMultistepScheduler(
-                **self._options, timestep_spacing="trailing", final_sigmas_type="zero"
-            )
-        total = min(NOISES, round(asked.steps / strength))
+            scheduler = DDPMScheduler(**self._options, clip_sample=True, clip_sample_range=FURTHEST)
+            # Told the levels: from a number of steps that does not divide NOISES it would step by other ones.
+            levels = np.round(NOISES - np.arange(total) * NOISES / total).astype(int) - 1
+            scheduler.set_timesteps(timesteps=levels.tolist())
+            return scheduler, scheduler.timesteps[first:]
+        # DDIM is DPM-Solver++ of first order (Lu et al. 2022), and as diffusers has it goes by any levels.
+        scheduler = DPMSolverMultistepScheduler(
+            **self._options,
+            solver_order=1 if asked.sampler == "ddim" else 2,
+            timestep_spacing="trailing",
+            final_sigmas_type="zero",
+        )
         scheduler.set_timesteps(total)
-        first = max(0, total - asked.steps)
-        if asked.sampler == "dpm" and first:
+        if first:
             scheduler.set_begin_index(first)
         return scheduler, scheduler.timesteps[first:]

@@ -28,7 +28,7 @@ def around_body(mesh: GarmentMesh) -> NDArray[np.float64]:
     return place(mesh, body, mean, body.vertices(mean))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def skinned(length: float = 0.64, resolution: int = 403) -> tuple[GarmentMesh, NDArray, GarmentSkin]:
     """A tee, where it lies around the mean body, and its skin; length: of the garment, metres."""
     mesh = template("tee", {"garment_length": length}, resolution)
