@@ -19,7 +19,7 @@ from muslin.learn.wrinkles.network import Seen, WrinkleNetwork
 from muslin.learn.wrinkles.process import Drawing, Process
 from muslin.learn.wrinkles.rollout import draw
 
-MOST_VALIDATED = 32
+MOST_VALIDATED = 16
 """Frames of a split on which the error is logged."""
 
 

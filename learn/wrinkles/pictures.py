@@ -20,6 +20,7 @@ from muslin.learn.wrinkles.process import Drawing, Process
 from muslin.learn.wrinkles.rollout import draw
 from muslin.sim.dataset import durable
 from muslin.sim.dataset.sample import Sample
+from muslin.sim.view.lighting import DRAFT
 from muslin.sim.view.picture import picture
 from muslin.sim.view.sheet import contact_sheet
 
@@ -51,13 +52,13 @@ class Pictures:
         self, examples: Mapping[str, Example], process: Process, spread: float, epochs: int, folder: Path
     ) -> None:
         self.examples, self.process, self.spread, self.folder = dict(examples), process, spread, folder
-        self.every = max(1, epochs // TIMES)
+        self.epochs, self.every = epochs, max(1, epochs // TIMES)
         durable.make_folder(folder)
 
     def __call__(self, model: nn.Module, epoch: int) -> None:
         """epoch: how many are done."""
         assert isinstance(model, WrinkleNetwork)
-        if epoch % self.every:
+        if epoch % self.every and epoch < self.epochs:
             return
         shown, captions = [], []
         for name, example in self.examples.items():
@@ -92,4 +93,4 @@ def _garment_picture(example: Example, maps: NDArray[np.floating]) -> NDArray[np
     track = replace(track, poses=track.poses[[k]], translations=track.translations[[k]])
     positions = example.garment.positions(maps[None], track)
     shot = replace(sample, positions=positions, body=track, masked_faces=())
-    return picture(shot, 0, (PIXELS, PIXELS))
+    return picture(shot, 0, (PIXELS, PIXELS), quality=DRAFT)
