@@ -92,7 +92,7 @@ def predict(
       muslin predict out/pipeline --design sleeve_length=0.3 --beta 1.5 --out tee.obj
       muslin predict out/pipeline --dataset out/thesis_static --split test-designs --out out/predicted
       muslin predict out/pipeline --dataset out/thesis_static --baseline nearest --out out/nearest
-      muslin predict --scene scenes/tee_walk.toml --out out/walk
+      muslin predict out/temporal --scene scenes/tshirt_walk.toml --out out/walk
       muslin predict out/temporal --dataset out/thesis_animated --draw dpm:10 --out out/animated
     """
     given = dict(_parameter(entry) for entry in design or [])
