@@ -116,7 +116,7 @@ def predict(
     truth = None if dataset is None else select(dataset, split, conditions_of(where))
     if scene is not None or (truth is not None and _moves(truth, model)):
         drawing = _drawing(drawn, strength)
-        animator = _animator(model, drawing, fresh_noise, baseline, dataset)
+        animator = _animator(model, drawing, fresh_noise, baseline, truth)
         _animate(animator, truth, scene, overrides, out, seed, push_out)
         return
     if drawn or fresh_noise or strength != 1.0:
@@ -143,7 +143,7 @@ def _drawing(drawn: str, strength: float) -> Drawing:
 
 
 def _animator(
-    model: Path | None, drawing: Drawing, fresh_noise: bool, baseline: str | None, dataset: str | None
+    model: Path | None, drawing: Drawing, fresh_noise: bool, baseline: str | None, truth: Dataset | None
 ) -> Animator:
     from muslin.learn.wrinkles.baselines import baseline_of
     from muslin.learn.wrinkles.model import SHIPPED, load_wrinkles
@@ -152,7 +152,10 @@ def _animator(
     loaded = load_wrinkles(model or SHIPPED)
     loaded.drawing = drawing.of(loaded.process.kind)
     loaded.noise = "fresh" if fresh_noise else "fixed"
-    return loaded if baseline is None else baseline_of(loaded, baseline, open_dataset(str(dataset)))
+    if baseline is None:
+        return loaded
+    assert truth is not None
+    return baseline_of(loaded, baseline, open_dataset(truth.root))
 
 
 def _animate(

@@ -76,6 +76,10 @@ class MeanDrape(nn.Module):
             {"params": [*self.linear.parameters()], "weight_decay": 0.0},
         ]
 
+    def described(self) -> dict[str, Any]:
+        """What it takes to make one of these, besides its tensors, as JSON values; see `mean_drape_of`."""
+        return {"design": self.design, "names": self.names, "resolution": self.resolution}
+
     def parameters_of(self, values: Mapping[str, float]) -> Tensor:
         """(P,). Raises InputError if one is missing."""
         missing = [name for name in self.names if name not in values]
@@ -100,3 +104,10 @@ class MeanDrape(nn.Module):
         """(V, 3) at the vertices of the template, metres. Raises InputError if a parameter is missing."""
         positions: NDArray[np.float64] = self(self.parameters_of(values)[None])[0].double().numpy()
         return positions
+
+
+def mean_drape_of(told: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> MeanDrape:
+    """A network from what `described` told, which may be among other things, and its tensors."""
+    network = MeanDrape(told["design"], told["names"], told["resolution"])
+    network.load_state_dict(dict(tensors))
+    return network

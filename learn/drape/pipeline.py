@@ -15,7 +15,7 @@ from muslin.garments.mesh import GarmentMesh
 from muslin.learn.drape.body_surface import BodySurface
 from muslin.learn.drape.fabric import fabric_figures, file_stem
 from muslin.learn.drape.garment import PreparedGarment, prepare_garment
-from muslin.learn.drape.mean import MeanDrape
+from muslin.learn.drape.mean import MeanDrape, mean_drape_of
 from muslin.learn.drape.network import DrapeNetwork, NetworkConfig
 from muslin.learn.drape.world import World, shape_tensor
 from muslin.learn.graph.batch import batch_pyramids
@@ -103,9 +103,7 @@ class DrapePipeline:
     def save(self, folder: Path, dtype: torch.dtype = torch.float32) -> None:
         """One file of tensors a network; dtype: of what is stored, such as torch.bfloat16."""
         told = {
-            "design": self.mean.design,
-            "names": self.mean.names,
-            "resolution": self.mean.resolution,
+            **self.mean.described(),
             "world": asdict(self.world),
             "skinned": self.skinned,
         }
@@ -122,8 +120,7 @@ def load_pipeline(folder: Path, cache: Path | None = None) -> DrapePipeline:
     Raises InputError if a file is missing or damaged, and if the body is not the one it was trained on.
     """
     tensors, told = _read(folder / MEAN)
-    mean = MeanDrape(told["design"], told["names"], told["resolution"])
-    mean.load_state_dict(tensors)
+    mean = mean_drape_of(told, tensors)
     world = World.of(told["world"])
     _, smooth = _network(folder / SMOOTH)
     fine = dict(_network(file) for file in sorted((folder / FINE).glob("*.safetensors")))

@@ -20,8 +20,8 @@ from muslin.sim.dataset.selection import select
 
 
 @dataclass(frozen=True, eq=False)
-class SkinnedTemplate:
-    """The template of G_design on the skin, nothing else."""
+class _OfModel:
+    """What a baseline has of the model beside which it is measured: all but how maps come about."""
 
     model: WrinkleModel
 
@@ -36,6 +36,10 @@ class SkinnedTemplate:
     @property
     def garments(self) -> GarmentCache:
         return self.model.garments
+
+
+class SkinnedTemplate(_OfModel):
+    """The template of G_design on the skin, nothing else."""
 
     def maps(self, sequences: Sequence[Told], seed: int = 0) -> list[NDArray[np.float32]]:
         count = int(self.model.network.mask.sum())
@@ -43,23 +47,10 @@ class SkinnedTemplate:
 
 
 @dataclass(frozen=True, eq=False)
-class NearestFrame:
+class NearestFrame(_OfModel):
     """In every frame the map of the training frame with the nearest condition, over its spread."""
 
-    model: WrinkleModel
     clips: Sequence[Clip]
-
-    @property
-    def world(self) -> SequenceWorld:
-        return self.model.world
-
-    @property
-    def condition(self) -> Condition:
-        return self.model.condition
-
-    @property
-    def garments(self) -> GarmentCache:
-        return self.model.garments
 
     def maps(self, sequences: Sequence[Told], seed: int = 0) -> list[NDArray[np.float32]]:
         width = self.model.network.width

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -48,10 +49,16 @@ class Clip:
 def told_of(garment: UnposedGarment, track: BodyTrack, fabric: str, condition: Condition, fps: float) -> Told:
     """What is told of a garment on a moving body."""
     conditions = condition.of(track, fps, garment.mesh.parameters, fabric).numpy()
+    return Told(conditions, _fields(garment, track, condition, fps))
+
+
+def _fields(
+    garment: UnposedGarment, track: BodyTrack, condition: Condition, fps: float
+) -> NDArray[np.float32]:
     if condition.fields:
-        return Told(conditions, garment.fields(track, fps))
+        return garment.fields(track, fps)
     side = garment.places.layout.size
-    return Told(conditions, np.zeros((len(conditions), 0, side, side), np.float32))
+    return np.zeros((len(track.poses), 0, side, side), np.float32)
 
 
 def read_clips(
@@ -102,31 +109,26 @@ def _clip(
     folder: Path | None,
 ) -> Clip:
     moved = mirrored_track(track, garment.skin.model) if mirror else track
-
-    def maps() -> NDArray[np.float32]:
-        made = garment.mirrored_maps if mirror else garment.maps
-        return made(sample.positions, track)
-
-    def fields() -> NDArray[np.float32]:
-        return told_of(garment, moved, sample.fabric, condition, fps).fields
-
-    name = f"{sample.id}-mirrored" if mirror else sample.id
-    if folder is None:
-        return Clip(name, maps(), told_of(garment, moved, sample.fabric, condition, fps))
+    encode = garment.mirrored_maps if mirror else garment.maps
     size, places = garment.codec.layout.size, garment.places.layout.size
     key = sha256(repr((KEPT, size, places, condition.fields, fps, mirror)).encode())
     for values in (garment.template, sample.positions, track.beta, track.poses, track.translations):
         key.update(np.ascontiguousarray(values).data)
     stem = key.hexdigest()[:24]
-    kept = _kept(folder / f"{stem}-fields.npy", fields)
+    maps = _kept(folder, f"{stem}-maps.npy", partial(encode, sample.positions, track))
+    fields = _kept(folder, f"{stem}-fields.npy", partial(_fields, garment, moved, condition, fps))
     conditions = condition.of(moved, fps, garment.mesh.parameters, sample.fabric).numpy()
-    return Clip(name, _kept(folder / f"{stem}-maps.npy", maps), Told(conditions, kept))
+    return Clip(f"{sample.id}-mirrored" if mirror else sample.id, maps, Told(conditions, fields))
 
 
-def _kept(file: Path, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:
-    """What a file has, mapped into memory; made first if it is not there."""
+def _kept(folder: Path | None, name: str, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:
+    """What a file of a folder has, mapped into memory, made first if it is not there; without a folder what
+    is made."""
+    if folder is None:
+        return make()
+    file = folder / name
     if not file.exists():
-        durable.make_folder(file.parent)
+        durable.make_folder(folder)
         stream = io.BytesIO()
         np.save(stream, make(), allow_pickle=False)
         durable.write_file(file, stream.getvalue())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from hashlib import sha256
 
 import numpy as np
@@ -47,8 +48,14 @@ class UnposedGarment:
         Body and template are as good as symmetric, or else it is of a body slightly another.
         """
         unposed = self.skin.unposed(positions, track.beta, track.poses, track.translations)
+        codec, template_map = self._mirror
+        return (codec.encode(FLIP * unposed) - template_map).astype(np.float32)
+
+    @cached_property
+    def _mirror(self) -> tuple[MapCodec, NDArray[np.float64]]:
+        """The codec of the mirror image of the mesh, and (N, 3) the template on this side."""
         reflected = MapCodec(self.codec.layout, replace(self.mesh, uv=mirrored_uv(self.mesh)))
-        return (reflected.encode(FLIP * unposed) - self.codec.encode(self.template)).astype(np.float32)
+        return reflected, self.codec.encode(self.template)
 
     def fields(self, track: BodyTrack, fps: float) -> NDArray[np.float32]:
         """(T, FIELDS, S, S) `motion_fields` on a moving body, as images of the size of `places`."""

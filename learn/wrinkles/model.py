@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from muslin.garments.errors import InputError
-from muslin.learn.drape.mean import MeanDrape
+from muslin.learn.drape.mean import MeanDrape, mean_drape_of
 from muslin.learn.training.checkpoint import read_tensors, write_tensors
 from muslin.learn.wrinkles.clips import Told
 from muslin.learn.wrinkles.condition import Condition
@@ -54,12 +54,7 @@ class WrinkleModel:
 
     def save(self, folder: Path, dtype: torch.dtype = torch.float32) -> None:
         """Two files of tensors; dtype: of the weights that are stored, such as torch.bfloat16."""
-        told = {
-            "design": self.templates.design,
-            "names": self.templates.names,
-            "resolution": self.templates.resolution,
-            "world": asdict(self.world),
-        }
+        told = {**self.templates.described(), "world": asdict(self.world)}
         durable.make_folder(folder)
         write_tensors(folder / TEMPLATES, self.templates.state_dict(), told)
         state = self.network.state_dict()
@@ -79,14 +74,12 @@ def load_wrinkles(folder: Path) -> WrinkleModel:
     if not holds_wrinkles(folder):
         raise InputError(f"{folder}: holds no model of animated garments; train one: `muslin train wrinkles`")
     tensors, told = read_tensors(folder / TEMPLATES)
-    templates = MeanDrape(told["design"], told["names"], told["resolution"])
-    templates.load_state_dict(tensors)
     weights, own = read_tensors(folder / WRINKLES)
     network = WrinkleNetwork(NetworkConfig.from_json(own["config"]))
     network.load_state_dict({name: value.float() for name, value in weights.items()})
     return WrinkleModel(
         SequenceWorld.of(told["world"]),
-        templates,
+        mean_drape_of(told, tensors),
         Condition.from_json(own["condition"]),
         Process(own["process"]),
         network.eval(),

@@ -66,7 +66,7 @@ SIZES: dict[str, dict[str, object]] = {
     "medium": {"patch": 2, "channels": (64, 96, 128, 128), "layers": 2},
     "thesis": {"patch": 1, "channels": (128, 128, 256, 256, 512, 512), "layers": 2, "attention": (4,)},
 }
-"""Of networks: 0.4, 3.7, 7.6 and 113.8 million weights. The last is that of the thesis, chapter 5."""
+"""Of networks: 0.4, 3.7, 7.7 and 113.9 million weights. The last is that of the thesis, chapter 5."""
 
 
 @dataclass(frozen=True, eq=False)

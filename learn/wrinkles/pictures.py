@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from torch import Tensor, nn
 from muslin.learn.wrinkles.clips import Clip
 from muslin.learn.wrinkles.garment import UnposedGarment
 from muslin.learn.wrinkles.layout import MapLayout
-from muslin.learn.wrinkles.network import WrinkleNetwork
+from muslin.learn.wrinkles.network import Seen, WrinkleNetwork
 from muslin.learn.wrinkles.objective import Frames
 from muslin.learn.wrinkles.process import Drawing, Process
 from muslin.learn.wrinkles.rollout import draw
@@ -42,6 +43,15 @@ class Example:
     frame: int
 
 
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """What a network sees of an example, and the pictures that stay the same."""
+
+    seen: Seen
+    map: NDArray[np.uint8]
+    garment: NDArray[np.uint8]
+
+
 class Pictures:
     """After some epochs one PNG: a row for each example, with its true and its drawn map and garment.
 
@@ -63,18 +73,23 @@ class Pictures:
         shown, captions = [], []
         for name, example in self.examples.items():
             layout = example.garment.codec.layout
-            frames = Frames([example.clip], layout, self.spread)
-            true, seen = frames.read([example.frame])
-            drawn = draw(model, self.process, seen, [(0,)], Drawing()).cpu()
-            maps = {"true": true[0], "drawn": drawn[0]}
-            for what, own in maps.items():
-                shown.append(map_picture(own, layout))
-                captions.append(f"{name}, {what}")
-            for what, own in maps.items():
-                shown.append(_garment_picture(example, layout.values(self.spread * own.numpy())))
-                captions.append(what)
+            truth = self._truths[name]
+            drawn = draw(model, self.process, truth.seen, [(0,)], Drawing()).cpu()[0]
+            garment = _garment_picture(example, layout.values(self.spread * drawn.numpy()))
+            shown += [truth.map, map_picture(drawn, layout), truth.garment, garment]
+            captions += [f"{name}, true", f"{name}, drawn", "true", "drawn"]
         file = self.folder / f"epoch-{epoch:04d}.png"
         Image.fromarray(contact_sheet(shown, 4, captions)).save(file)
+
+    @cached_property
+    def _truths(self) -> dict[str, _Truth]:
+        found = {}
+        for name, example in self.examples.items():
+            layout = example.garment.codec.layout
+            maps, seen = Frames([example.clip], layout, self.spread).read([example.frame])
+            garment = _garment_picture(example, layout.values(self.spread * maps[0].numpy()))
+            found[name] = _Truth(seen, map_picture(maps[0], layout), garment)
+        return found
 
 
 def map_picture(image: Tensor, layout: MapLayout) -> NDArray[np.uint8]:

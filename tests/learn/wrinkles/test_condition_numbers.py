@@ -18,6 +18,7 @@ from muslin.learn.wrinkles.condition import (
     used_betas,
     varied_parameters,
 )
+from muslin.sim.body.joints import JOINT
 from muslin.sim.dataset.certificate import Certificate
 from muslin.sim.dataset.sample import Sample
 from tests.learn.wrinkles.worn import BETA, FPS, swinging, track, turned
@@ -147,3 +148,14 @@ def test_what_varies_in_samples_is_what_is_told() -> None:
     assert varied_parameters(samples[:1]) == ()
     assert used_betas(samples) == 2
     assert used_betas(samples[2:]) == 1
+
+
+def test_hands_and_feet_do_not_matter() -> None:
+    motion = swinging(4)
+    other = motion.poses.copy()
+    unseen = [number for number in range(1, 24) if number not in JOINTS]
+    other[:, unseen] += 0.3
+    assert {JOINT["left_wrist"], JOINT["right_foot"], JOINT["head"]} <= set(unseen)
+    np.testing.assert_array_equal(pose_features(motion.poses), pose_features(other))
+    rates = (motion_features(poses, motion.translations, FPS) for poses in (motion.poses, other))
+    np.testing.assert_array_equal(*rates)
