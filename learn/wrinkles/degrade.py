@@ -12,8 +12,7 @@ from muslin.garments.errors import InputError
 
 REACH = 3.0
 """Standard deviations after which the kernel of a blur ends."""
-
-
+MOST_OWN = 16
 PATCH = 16
 """Texels a side of what noise is the same over, about: a network's errors are smooth."""
 
@@ -23,10 +22,13 @@ class Degrading:
     """blur: standard deviation at most, in shares of the map's side; colour: standard deviation at most of
     the scale and, in spreads, of the offset of each channel; noise: the same of what is added, smooth over
     PATCH texels; unknown: share of maps that are left out, as before a first frame; conditions: standard
-    deviation of what is added to these, in their spreads.
+    deviation of what is added to these, in their spreads; own: most frames that lead to one, each said from
+    the one before, whose last is then the frame before.
 
     The thesis blurs and jitters colours. Noise as large as a network's own errors, more on some maps than on
-    others, keeps it from taking the frame before as the truth, so that errors die out instead of adding up.
+    others, keeps it from taking the frame before as the truth, so that errors die out instead of adding up;
+    and it learns from its own maps, errors and all, to do better (Brandstetter et al. 2022, "Message Passing
+    Neural PDE Solvers": the pushforward).
     """
 
     blur: float = 0.02
@@ -34,6 +36,7 @@ class Degrading:
     noise: float = 0.8
     unknown: float = 0.25
     conditions: float = 0.1
+    own: int = 2
 
     def __post_init__(self) -> None:
         for name, most in (
@@ -45,6 +48,8 @@ class Degrading:
         ):
             if not 0.0 <= getattr(self, name) <= most:
                 raise InputError(f"{name} = {getattr(self, name)}: must be from 0 to {most:g}")
+        if not 0 <= self.own <= MOST_OWN:
+            raise InputError(f"own = {self.own}: must be from 0 to {MOST_OWN}")
 
     def __call__(self, maps: Tensor, mask: Tensor, generator: torch.Generator) -> Tensor:
         """Maps (B, 3, S, S) blurred, noisy, channels scaled and shifted; 0 outside of the mask (S, S)."""

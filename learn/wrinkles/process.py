@@ -27,6 +27,8 @@ SAMPLERS = {
 """Of each kind; the first is the usual one."""
 STEPS = {"ddpm": 100, "ddim": 10, "dpm": 5, "euler": 2, "once": 1}
 """Usual numbers of them."""
+ONE_STEP = {"epsilon": "ddim", "v": "ddim", "flow": "euler", "regression": "once"}
+"""Of each kind the sampler whose only step goes to what is said."""
 NOISES = 100
 """Levels of noise of diffusion, as in the thesis."""
 FLOW_NOISES = 1000
@@ -34,9 +36,12 @@ FLOW_NOISES = 1000
 FURTHEST = 8.0
 """Spreads beyond which no value of a map lies; cuts off what division by nearly nothing makes of noise."""
 
-HEAVIEST = 5.0
+HEAVIEST = {"epsilon": 5.0, "v": 1.0, "flow": 1.0}
 """Of the weights of a loss, which are without bound where there is hardly any noise: there x is nearly told
 already, and what conditions say of it is learned where there is much."""
+PURE = 0.5
+"""Share of the maps that v and flow are learned at pure noise, where nothing but the conditions tells x: of
+white noise on smooth maps a little less tells their waves already, and it is there that few steps begin."""
 
 Predict = Callable[[Tensor, Tensor], Tensor]
 """The network's answer to (x_t, t), all else fixed: x."""
@@ -99,12 +104,16 @@ class Process:
         self._noises = DDPMScheduler(**self._options)
 
     def times(self, count: int, generator: torch.Generator) -> Tensor:
-        """(count,) t to learn at, random and uniform."""
-        if self.kind == "flow":
-            return FLOW_NOISES * torch.rand(count, generator=generator).clamp_min(1.0 / FLOW_NOISES)
+        """(count,) t to learn at, random and uniform; of v and flow a share PURE at the highest."""
         if self.kind == "regression":
             return torch.zeros(count)
-        return torch.randint(NOISES, (count,), generator=generator)
+        if self.kind == "epsilon":
+            return torch.randint(NOISES, (count,), generator=generator)
+        pure = torch.rand(count, generator=generator) < PURE
+        if self.kind == "v":
+            return torch.randint(NOISES, (count,), generator=generator).where(~pure, NOISES - 1)
+        shares = torch.rand(count, generator=generator).clamp_min(1.0 / FLOW_NOISES)
+        return FLOW_NOISES * shares.where(~pure, 1.0)
 
     def noisy(self, x: Tensor, noise: Tensor, t: Tensor) -> Tensor:
         """x_t (B, 3, S, S) of x and noise (B, 3, S, S), t (B,)."""
@@ -121,10 +130,14 @@ class Process:
         if self.kind == "regression":
             return torch.ones(len(t))
         if self.kind == "flow":
-            return (t / FLOW_NOISES).square().reciprocal().clamp_max(HEAVIEST)
+            return (t / FLOW_NOISES).square().reciprocal().clamp_max(HEAVIEST["flow"])
         kept = self._noises.alphas_cumprod[t]
         over = kept if self.kind == "epsilon" else torch.ones_like(kept)
-        return (over / (1.0 - kept)).clamp_max(HEAVIEST)
+        return (over / (1.0 - kept)).clamp_max(HEAVIEST[self.kind])
+
+    def first(self, predict: Predict, noise: Tensor) -> Tensor:
+        """x (B, 3, S, S) as it is said at once, of noise (B, 3, S, S) alone."""
+        return self.draw(predict, noise, Drawing(ONE_STEP[self.kind], 1))
 
     def draw(
         self,

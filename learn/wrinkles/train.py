@@ -103,6 +103,7 @@ def train_wrinkles(
         settings.degrading,
         settings.batch,
         seed,
+        settings.temporal,
     )
     examples = {
         name: Example(part[0], model.garments.of(part[0].garment), clips[name][0], len(clips[name][0]) // 2)

@@ -9,6 +9,7 @@ from muslin.learn.wrinkles.process import (
     HEAVIEST,
     KINDS,
     NOISES,
+    PURE,
     SAMPLERS,
     STEPS,
     Drawing,
@@ -167,27 +168,49 @@ def test_the_weighted_loss_is_that_of_noise_of_v_or_of_the_velocity(kind: str) -
     t = torch.tensor(levels) if kind == "flow" else torch.tensor(levels).long()
     weight = Process(kind).weight(t).numpy()
     exact = wrong**2 / (said - x) ** 2
-    np.testing.assert_allclose(weight, np.minimum(exact, HEAVIEST), rtol=1e-3, atol=1e-6)
-    assert (exact < HEAVIEST).sum() >= 5
-    assert exact.max() > HEAVIEST
+    np.testing.assert_allclose(weight, np.minimum(exact, HEAVIEST[kind]), rtol=1e-3, atol=1e-6)
+    assert exact.max() > HEAVIEST[kind]
+    # That of e is 0 at pure noise, the others' are 1 at least.
+    assert (exact < HEAVIEST[kind]).sum() >= (5 if kind == "epsilon" else 0)
+    assert exact.min() == pytest.approx(0.0 if kind == "epsilon" else 1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_times_are_uniform_and_within_the_levels(kind: str) -> None:
+def test_times_are_uniform_but_for_those_of_pure_noise(kind: str) -> None:
     t = Process(kind).times(20_000, torch.Generator().manual_seed(0))
     again = Process(kind).times(20_000, torch.Generator().manual_seed(0))
     assert torch.equal(t, again)
     if kind == "regression":
         assert (t == 0).all()
         return
-    levels = FLOW_NOISES if kind == "flow" else NOISES
-    assert t.min() >= 0
-    assert t.max() <= (FLOW_NOISES if kind == "flow" else NOISES - 1)
-    # A tenth of them each, 2000, is sure to 42.
-    counts = np.histogram(t, bins=10, range=(0, levels))[0]
-    assert np.abs(counts - 2000).max() < 200
-    if kind == "flow":
-        assert t.min() >= 1.0
+    last = FLOW_NOISES if kind == "flow" else NOISES - 1
+    least = 1 if kind == "flow" else 0
+    assert least <= t.min() < last / 100
+    assert t.max() == last
+    pure = t == last
+    share = {"epsilon": 1.0 / NOISES, "v": PURE + (1.0 - PURE) / NOISES, "flow": PURE}[kind]
+    # Of 20 000 the share is sure to 0.0036.
+    assert float(pure.float().mean()) == pytest.approx(share, abs=0.015)
+    rest = t[~pure]
+    counts = np.histogram(rest, bins=9, range=(0, last))[0] / len(rest)
+    np.testing.assert_allclose(counts, 1.0 / 9.0, atol=0.015)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_said_first_is_what_is_said_of_pure_noise(kind: str) -> None:
+    asked: list[tuple[Tensor, Tensor]] = []
+
+    def predict(x: Tensor, t: Tensor) -> Tensor:
+        asked.append((x, t))
+        return 0.2 * x + 1.5
+
+    e = noise(4, (2, 3, 8, 8))
+    found = Process(kind).first(predict, e)
+    ((x, t),) = asked
+    assert torch.equal(x, torch.zeros_like(e) if kind == "regression" else e)
+    last = {"regression": 0, "flow": FLOW_NOISES}.get(kind, NOISES - 1)
+    assert t.tolist() == [last, last]
+    torch.testing.assert_close(found, 0.2 * x + 1.5, atol=1e-5, rtol=0.0)
 
 
 @pytest.mark.parametrize(
